@@ -57,12 +57,14 @@ def npy(path, request):
 
 
 def csv(path, request):
-    """Lines of fields, separated by commas, semicolons or white space. A first line that is not numeric names the columns, and so does a
+    """Lines of fields, separated by commas, or by semicolons or white space. A first line that is not numeric names the columns, and so does a
     comment before it with as many words as there are fields, as NumPy writes it. Other lines that begin with # are comments."""
     text = read_text(path)
     for number, line in enumerate(text.splitlines(), 1):
-        if re.match(r"[^#]*(\d,\d.*;|;.*\d,\d)", line):
-            raise Refused(f"has decimal commas in line {number}: write numbers with decimal points")
+        fields = [field.strip() for field in line.partition("#")[0].split(",")]
+        quoted = "".join(line.split('"')[1::2]) if '"' in line else ""
+        if "," in quoted or len(fields) > 1 and any(re.search(r"[;\s]", field) for field in fields):
+            raise Refused(f"has decimal commas or several separators in line {number}: write decimal points and one separator")
     lines = [line.strip() for line in text.translate(str.maketrans(",;", "  ", '"')).splitlines() if line.strip()]
     comments = list(itertools.takewhile(lambda line: line.startswith("#"), lines))
     lines = [line for line in lines if not line.startswith("#")]

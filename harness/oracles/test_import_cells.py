@@ -173,11 +173,14 @@ class CellsTest(unittest.TestCase):
         root = root_of([0.0, 0.0, 0.0, 1.0])
         sentences = {
             "": "has no cells",
-            ",,;\n": "has no cells",
+            ",,\n": "has no cells",
             "x,y,z,level\n": "has no cells",
             "x,y,level\n0,0,1\n": "has no column z",
             "x,y,z\n0,0,1\n": "has no column level",
-            "x;y;z;level\n0;0;0;1\n0,5;0;0;1": "has decimal commas in line 3",
+            "x;y;z;level\n0;0;0;1\n0,5;0;0;1": "has decimal commas or several separators in line 3",
+            "0,5\t0,5\t0,5\t1": "has decimal commas or several separators in line 1",
+            '"0,5","0,5","0,5","1"': "has decimal commas or several separators in line 1",
+            "0;0;0;,5": "has decimal commas or several separators in line 1",
             "x,y,z,level,Level\n0,0,0,1,2": "has more than one column level",
             "0 0 0 one\n": "no table of numbers",
             "0 0 0 1\n0 0 0\n": "no table of numbers",

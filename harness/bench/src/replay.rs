@@ -14,7 +14,7 @@ use statistics::Median;
 use std::collections::BTreeSet;
 
 /// Name and version of the schema.
-const SCHEMA: &str = "octree-replay/1";
+const SCHEMA: &str = "octree-replay/2";
 /// How far a ratio may be outside of the interval of its repetitions.
 pub const TOLERANCE: f64 = 0.25;
 /// The share of all ratios that must be inside of their bands.

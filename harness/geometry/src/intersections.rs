@@ -17,7 +17,7 @@ const ROUNDING: f64 = 2.0;
 /// The search ends when it has found this number of pairs.
 const PAIRS_MAX: usize = 1 << 22;
 
-/// Pairs of facets whose interiors intersect, counted once for all copies of each. Degenerate facets and pairs of facets with
+/// Pairs of facets whose interiors intersect, counted once for all copies of each with the same winding. Degenerate facets and pairs of facets with
 /// the same vertices are left out.
 pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     let facet = |f: u32| &input.case.facets_lattice[f as usize];

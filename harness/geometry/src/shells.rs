@@ -85,18 +85,20 @@ impl Shells {
             shell.is_closed &= uses.len() % 2 == 0;
             shell.is_oriented &= 2 * down == uses.len();
         }
+        let mut own = vec![Vec::new(); all.len()];
+        for (facet, shell) in lattice.iter().zip(&of).filter(|(_, shell)| **shell != u32::MAX) {
+            own[*shell as usize].push(*facet);
+        }
         let mut interiors: HashMap<usize, Parity> = HashMap::new();
-        for index in (0..all.len()).filter(|&i| all[i].is_closed).collect::<Vec<_>>() {
+        let closed: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_closed).collect();
+        for &index in &closed {
             let corner = lattice[all[index].facet_first as usize][0];
             let mut contains = |other: &usize| {
-                let interior = interiors.entry(*other).or_insert_with(|| {
-                    let own = lattice.iter().zip(&of).filter(|(_, of)| **of as usize == *other);
-                    Parity::new(&own.map(|(facet, _)| *facet).collect::<Vec<_>>())
-                });
+                let interior = interiors.entry(*other).or_insert_with(|| Parity::new(&own[*other]));
                 interior.inside(corner) == [true; 6]
             };
-            let is_around = |i: &usize| all[*i].is_closed && all[index].may_be_in(&all[*i]);
-            let around = (0..all.len()).filter(is_around).filter(&mut contains).count();
+            let may_be_in = |other: &&usize| all[index].may_be_in(&all[**other]);
+            let around = closed.iter().filter(may_be_in).filter(|other| contains(other)).count();
             all[index].is_nested = around % 2 == 1;
         }
         Self { all, of }

@@ -5,7 +5,7 @@
 
 use super::measure::{self, Input, Measure};
 use crate::experiments::cases::grown;
-use crate::experiments::entry::{Comm, Setup};
+use crate::experiments::entry::{Comm, Entry, Line, Setup};
 use crate::order::distinct;
 use crate::{name_of, read_toml, refuse};
 use run::engine::description::{Description, is_own};
@@ -244,18 +244,16 @@ impl Study {
         *setup == run.setup(spacing_min.unwrap_or(spacing), layer_cells_min.unwrap_or(n))
     }
 
-    /// Whether the study asks for a run, whatever its program and the spacing that gives as many cells as were asked for.
-    pub fn has_run(&self, setup: &Setup) -> bool {
-        let is_of = |series: &Series| {
-            let has_ranks = match setup.comm {
-                Comm::Solo => true,
-                Comm::Mpi => series.mpi.contains(&setup.ranks),
-                Comm::Sim => series.sim.contains(&setup.ranks),
-            };
-            let of = (name_of(&series.experiment), series.name());
-            has_ranks && of == (setup.experiment.clone(), setup.case.clone())
+    /// Returns the setup of a line that this study does not ask for, whatever the program.
+    pub fn unasked<'a>(&self, line: &'a Line) -> Option<&'a Setup> {
+        let (setup, cells) = match &line.entry {
+            Entry::Run(run) => (&run.setup, Some(run.cells).filter(|_| is_own(&run.setup.engine))),
+            Entry::Failure(without) | Entry::LeftOut(without) => (&without.setup, None),
+            _ => return None,
         };
-        self.series.iter().any(is_of) || self.run.keys().any(|name| self.is_run(name, setup))
+        let is_of_series = self.series.iter().any(|series| series.asks_for(setup, cells));
+        let is_of_row = || self.run.keys().any(|name| self.is_run(name, setup));
+        (!is_of_series && !is_of_row()).then_some(setup)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -339,6 +337,26 @@ impl Series {
     fn name(&self) -> String {
         let case = Path::new(&self.case).file_stem().unwrap_or_default().to_string_lossy();
         self.facets.map_or(case.clone().into(), |facets| grown(&case, facets))
+    }
+
+    /// Whether it is a run of this series, or a serial one in place of it. `cells` are those of the mesh, if that is ours: meshes of others may be far from
+    /// what was asked for, and where the number of cells jumps with the spacing, ours are not close either.
+    fn asks_for(&self, setup: &Setup, cells: Option<u64>) -> bool {
+        let has_ranks = match setup.comm {
+            Comm::Solo => true,
+            Comm::Mpi => self.mpi.contains(&setup.ranks),
+            Comm::Sim => self.sim.contains(&setup.ranks),
+        };
+        let fits = |asked: &f64| match setup.series_cells {
+            Some(of_series) => of_series == *asked,
+            None => cells.is_none_or(|cells| (0.25..4.0).contains(&(cells as f64 / asked))),
+        };
+        let division = (setup.weights.as_str(), setup.partitioner.as_str());
+        (name_of(&self.experiment), self.name()) == (setup.experiment.clone(), setup.case.clone())
+            && has_ranks
+            && (self.layers.is_empty() || self.layers.contains(&setup.layer_cells_min))
+            && (self.cells.is_empty() || self.cells.iter().any(fits))
+            && self.choices().contains(&division)
     }
 
     /// Returns the partitions that are compared.

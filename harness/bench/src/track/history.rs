@@ -3,7 +3,7 @@
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
 //! in which their commits were made, so that a commit may be measured later than its successors; those without a time come first.
 //!
-//! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
+//! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`; a record without a machine is of the first. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
 //!
 //! A record with `accepted` states that the user has accepted the values from that commit on.
@@ -170,7 +170,10 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
-        let suffix = machines.suffix("", &record.machine);
+        let suffix = match record.machine.as_str() {
+            "" => String::new(),
+            machine => machines.suffix("", machine),
+        };
         let mut of_geometry = record.geometries.clone();
         of_geometry.iter_mut().for_each(|(case, of)| *of = geometries.suffix(case, of));
         let named = |(mut name, value): (String, f64)| {
@@ -390,6 +393,20 @@ mod tests {
         assert!(parse(&format!("{line}\n\nx\n")).contains(": line 3"));
         let other = line.replace("track/1", "track/2");
         assert!(parse(&other).contains("track/2"));
+    }
+
+    #[test]
+    fn a_history_without_machines_goes_on_when_they_are_recorded() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for (commit, machine) in [("a", ""), ("b", "x"), ("c", "y")] {
+            let of_machine = record(commit, &[("a/time", 1.0)]);
+            append(&path, &Record { machine: machine.into(), ..of_machine }).unwrap();
+        }
+        let History { records, warnings } = read(&path).unwrap();
+        let names = records.iter().flat_map(|record| record.metrics.keys());
+        assert!(names.eq(["a/time", "a/time", "a/time [2]"]));
+        assert_eq!(warnings.len(), 1);
     }
 
     #[test]

@@ -49,8 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
     let of_study = Study::read(study)?;
-    let mut runs = lines.iter().filter_map(Line::run).map(|run| &run.setup);
-    if let Some(setup) = runs.find(|setup| !of_study.has_run(setup)) {
+    if let Some(setup) = lines.iter().find_map(|line| of_study.unasked(line)) {
         let why = format!(
             "the record has a run that the study does not ask for, {setup}: give the study that made it"
         );

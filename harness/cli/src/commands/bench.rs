@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let code = match arguments.show {
         true => {
             let mut lines = super::report::read(&[record])?;
-            lines.retain(|line| line.run().is_none_or(|run| study.has_run(&run.setup)));
+            lines.retain(|line| study.unasked(line).is_none());
             publish(&study, &study::judged(&study, &lines), &lines, report)?
         }
         false => measure(arguments, study, &record)?,

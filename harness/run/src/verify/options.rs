@@ -51,10 +51,10 @@ pub struct Options {
     /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
     #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub ranks: Option<Vec<usize>>,
-    /// Partitioners, each at every rank count [default: metis,morton]
+    /// Partitioners of the runs on MPI, each at every rank count [default: metis,morton]
     #[arg(long, value_delimiter = ',')]
     pub partitioners: Option<Vec<String>>,
-    /// Base depths, each with every partitioner [default: auto,3]
+    /// Base depths of the runs on MPI, each with every partitioner [default: auto,3]
     #[arg(long, value_delimiter = ',')]
     pub level_bases: Option<Vec<String>>,
     /// Directory for reports and for results that are kept [default: a temporary one]

@@ -1,5 +1,6 @@
 use super::*;
-use crate::testing::study as read;
+use crate::experiments::entry::{NoResult, Run};
+use crate::testing::{line, run, study as read};
 use run::engine::description::Description;
 use std::collections::BTreeSet;
 
@@ -114,17 +115,7 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     study.only(&["weak".to_owned()]).unwrap();
     assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
     let growing = read(&text.replace("mpi", "facets = 80\nmpi")).unwrap();
-    let known = |(experiment, case, comm, ranks): (&str, &str, Comm, usize)| {
-        let of =
-            Setup { experiment: experiment.into(), comm, ranks, ..Setup::serial(case, 1.0, 4) };
-        growing.has_run(&of)
-    };
-    let of_weak = ("weak", "cube-80-facets-per-rank", Comm::Mpi, 1);
-    let asked = [of_weak, ("strong", "cube", Comm::Sim, 2), ("strong", "cube", Comm::Solo, 1)];
-    assert_eq!(asked.map(known), [true; 3]);
-    let others = [("weak", "cube", Comm::Mpi, 1), ("strong", "ball", Comm::Sim, 2)];
-    assert_eq!(others.map(known), [false; 2]);
-    assert!(!known(("strong", "cube", Comm::Sim, 4)) && !known(("layers", "cube", Comm::Sim, 2)));
+    assert_eq!(growing.series[1].name(), "cube-80-facets-per-rank");
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
@@ -162,4 +153,51 @@ fn contradictions_are_reported() {
         assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
     }
     assert!(read("").unwrap_err().contains("no [[series]] and no [[row]]"));
+}
+
+#[test]
+fn a_study_asks_for_its_runs_alone() {
+    let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\ncells = [1e6]\nsim = [1, 2]\n\
+                [[series]]\nexperiment = 'layers'\ncase = 'cube'\ncells = [1e4]\nlayers = [1, 2]\nsim = [1]\n";
+    let study = read(text).unwrap();
+    let strong = |change: fn(&mut Run)| {
+        let mut run = run(Comm::Sim, 2_000_000, &[("a", &[1.0, 1.0])]);
+        (run.setup.weights, run.setup.partitioner) = Default::default();
+        change(&mut run);
+        study.unasked(&line(Entry::Run(Box::new(run)))).is_none()
+    };
+    let asked: [fn(&mut Run); 4] = [
+        |_| (),
+        |run| (run.setup.comm, run.setup.ranks) = (Comm::Solo, 1),
+        // Another program may make far fewer cells.
+        |run| (run.cells, run.setup.engine) = (9, "p4est".into()),
+        |run| {
+            (run.setup.experiment, run.setup.series_cells) = ("layers".into(), Some(1e4));
+            (run.setup.layer_cells_min, run.setup.ranks) = (2, 1);
+        },
+    ];
+    assert_eq!(asked.map(strong), [true; 4]);
+    let others: [fn(&mut Run); 8] = [
+        |run| run.setup.experiment = "weak".into(),
+        |run| run.setup.case = "ball".into(),
+        |run| run.setup.ranks = 4,
+        |run| run.setup.comm = Comm::Mpi,
+        |run| run.setup.weights = "unit".into(),
+        |run| run.cells = 9,
+        |run| {
+            (run.setup.experiment, run.setup.series_cells) = ("layers".into(), Some(5e4));
+            (run.setup.layer_cells_min, run.setup.ranks) = (2, 1);
+        },
+        |run| {
+            (run.setup.experiment, run.setup.series_cells) = ("layers".into(), Some(1e4));
+            run.setup.ranks = 1;
+        },
+    ];
+    assert_eq!(others.map(strong), [false; 8]);
+    // What failed or was left out is of an experiment, too.
+    let setup = Setup { experiment: "weak".into(), ..Setup::serial("cube", 1.0, 4) };
+    let without = NoResult { setup: setup.clone(), why: String::new() };
+    for entry in [Entry::Failure(without.clone()), Entry::LeftOut(without)] {
+        assert_eq!(study.unasked(&line(entry)), Some(&setup));
+    }
 }
