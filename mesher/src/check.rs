@@ -193,7 +193,7 @@ fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) ->
     let entry = |b: Brick| (ownership.owner(l, b.key), [b.key, b.bits]);
     let received =
         comm.sparse_all_to_all(MessageBuffer::of_entries(set.bricks().map(entry).collect()));
-    BrickSet::from_unsorted(received.values().collect())
+    BrickSet::from_unsorted(received.values())
 }
 
 /// The octants one step along an axis from those of a brick of level `l`. Some of the bricks may be empty.

@@ -23,7 +23,7 @@ use crate::record::Counters;
 use bricks::brick;
 use bricks::brickset::ones;
 use bricks::facet::{Facet, FacetTest, crossed};
-use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton, start57};
 use bricks::tree::Tree;
 use ranks::{Comm, MessageBuffer};
 use std::ops::Range;
@@ -33,30 +33,33 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
     let mut to_rank: Vec<Vec<Facet>> = vec![Vec::new(); comm.size()];
     // Index of the latest facet for each rank.
     let mut latest = vec![u64::MAX; comm.size()];
+    // Facets that follow each other in a slice are close in space: often in the interval of the one before.
+    let (mut interval, mut its_owner) = (0..0, 0);
     for (i, f) in (0u64..).zip(facets) {
         let Some(containing) = ContainingOctant::of(f) else { continue };
-        let extent = std::array::from_fn(|a| f.range(a));
-        let l = containing.level();
-        let code = containing.start() >> (3 * (LEVEL_MAX - l));
-        ownership.owners_in(l, code, &|l, code| reaches(&extent, l, code), &mut |owner| {
+        let (l, start) = (containing.level(), containing.start());
+        if !interval.contains(&start) {
+            (interval, its_owner) = ownership.interval_at(start);
+        }
+        let mut send = |owner: usize| {
             if std::mem::replace(&mut latest[owner], i) != i {
                 to_rank[owner].push(*f);
             }
-        });
+        };
+        let code = start >> (3 * (LEVEL_MAX - l));
+        match start57(l, code + 1) <= interval.end {
+            true => send(its_owner),
+            false => ownership.owners_in(l, code, &[0, 1, 2].map(|a| f.range(a)), &mut send),
+        }
     }
     let mut local = std::mem::take(&mut to_rank[comm.rank()]);
-    let mut messages = MessageBuffer::default();
+    let words = to_rank.iter().map(|facets| size_of_val(&facets[..]) / size_of::<u64>() + 1);
+    let mut messages = MessageBuffer::with_capacity(words.sum());
     for (owner, facets) in to_rank.into_iter().enumerate() {
         messages.write_values(owner, &facets);
     }
-    local.extend(comm.sparse_all_to_all(messages).values::<Facet>());
+    local.append(&mut comm.sparse_all_to_all(messages).values());
     local
-}
-
-/// Whether an extent reaches an octant, which is closed.
-fn reaches(extent: &[(i64, i64); 3], l: Level, code: u64) -> bool {
-    let (min, h) = (corner(l, code), edge(l));
-    (0..3).all(|a| extent[a].0 <= min[a] + h && extent[a].1 >= min[a])
 }
 
 /// The smallest octant that contains all closed level-19 cells that a facet's extent meets, and so the facet:
@@ -292,7 +295,7 @@ impl Voxeliser<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bricks::octant::start57;
+    use bricks::octant::{corner, edge};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -324,7 +327,7 @@ mod tests {
             prop_assume!(reached((0, 0)));
             let mut found = BTreeSet::new();
             let extent = std::array::from_fn(|a| f.range(a));
-            ownership.owners_in(0, 0, &|l, code| reaches(&extent, l, code), &mut |b| _ = found.insert(b));
+            ownership.owners_in(0, 0, &extent, &mut |b| _ = found.insert(b));
             let want = (0..).zip(&leaves).filter(|(_, leaf)| reached(**leaf)).map(|(owner, _)| owner);
             prop_assert!(found.into_iter().eq(want));
         }

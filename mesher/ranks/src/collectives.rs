@@ -50,7 +50,7 @@ const SMALL: usize = 8;
 /// The entries of all ranks in the order of their keys, each key once. Collective; the same on all ranks.
 pub fn all_gather_reduced(mut mine: Vec<Entry>, merge: Merge, comm: &dyn Comm) -> Vec<Entry> {
     if let Some(entries) = split_by_reducer(&mut mine, merge, comm) {
-        mine = comm.sparse_all_to_all(MessageBuffer::of_entries(entries)).values().collect();
+        mine = comm.sparse_all_to_all(MessageBuffer::of_entries(entries)).values();
     }
     all_gather_from_reducers(mine, merge, comm)
 }

@@ -85,7 +85,7 @@ pub trait Comm {
 pub fn gather<T: Pod>(comm: &dyn Comm, mine: &[T]) -> Vec<T> {
     let mut packed = MessageBuffer::default();
     packed.write_values(comm.rank(), mine);
-    comm.all_gather(packed.words()).values().collect()
+    comm.all_gather(packed.words()).values()
 }
 
 /// Runs `body` without counting the messages of its calls, and returns its result.

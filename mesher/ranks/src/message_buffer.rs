@@ -58,10 +58,14 @@ impl MessageBuffer {
     }
 
     /// The values of all messages.
-    pub fn values<T: Pod>(&self) -> impl Iterator<Item = T> {
+    pub fn values<T: Pod>(&self) -> Vec<T> {
         const { assert!(size_of::<T>() >= size_of::<u64>(), "padding is shorter than a value") };
-        let bytes = self.messages().map(|(_, words)| bytemuck::cast_slice::<u64, u8>(words));
-        bytes.flat_map(|b| b.chunks_exact(size_of::<T>())).map(bytemuck::pod_read_unaligned)
+        let mut values = Vec::with_capacity(size_of_val(&*self.words) / size_of::<T>());
+        for (_, words) in self.messages() {
+            let all = bytemuck::cast_slice::<u64, u8>(words).chunks_exact(size_of::<T>());
+            values.extend(all.map(bytemuck::pod_read_unaligned::<T>));
+        }
+        values
     }
 
     /// The messages, each with its rank, in the order in which they were written.
@@ -123,7 +127,7 @@ mod tests {
             let mut messages = MessageBuffer::default();
             messages.write_values(4, &values);
             messages.write_values(2, &values[..count.min(1) as usize]);
-            let read: Vec<[i32; 9]> = messages.values().collect();
+            let read: Vec<[i32; 9]> = messages.values();
             assert_eq!(read, [&values[..], &values[..count.min(1) as usize]].concat());
         }
     }

@@ -22,7 +22,7 @@ pub const ALL: Range<u64> = 0..1 << (3 * LEVEL_MAX);
 /// bins of a rank of `comm` are in order, and come after all bins of lower ranks; where every rank knows all bins, it partitions them as
 /// a single rank. Collective; the same on all ranks.
 pub fn partition(bins: &[Bin], ranks: usize, comm: &dyn Comm) -> Vec<Boundary> {
-    partition_at(bins, comm, |loads| equal(loads.iter().sum(), ranks))
+    cut_at(bins, comm, |loads| equal(loads.iter().sum(), ranks))
 }
 
 /// The same for ranks that already own the octants of their bins. The least weight changes owner such that no load exceeds the
@@ -33,15 +33,11 @@ pub fn repartition(bins: &[Bin], first_own: u64, tolerance: f64, comm: &dyn Comm
     if let Some(first) = bins.first_mut() {
         first[0] = first_own;
     }
-    partition_at(&bins, comm, |loads| nearly_equal(loads, tolerance))
+    cut_at(&bins, comm, |loads| nearly_equal(loads, tolerance))
 }
 
 /// The boundaries at the cumulative weights that `begins` returns, one for each rank, given the loads of the ranks.
-fn partition_at(
-    bins: &[Bin],
-    comm: &dyn Comm,
-    begins: impl Fn(&[u128]) -> Vec<u128>,
-) -> Vec<Boundary> {
+fn cut_at(bins: &[Bin], comm: &dyn Comm, begins: impl Fn(&[u128]) -> Vec<u128>) -> Vec<Boundary> {
     // So many leaves that no mesh has them saturate.
     let load = bins.iter().fold(0, |sum: u64, b| sum.saturating_add(b[1]));
     let loads: Vec<u128> = gather(comm, &[load]).into_iter().map(u128::from).collect();

@@ -66,9 +66,8 @@ impl Estimate<'_> {
             let small = |l: &Level| {
                 let h = edge(*l);
                 let in_box = |b: &ExtentBox| {
-                    let side =
-                        |a: usize| (b.max[a] - b.min[a]).min(h) as f64 / edge(b.level) as f64;
-                    (0..3).map(side).product::<f64>()
+                    let side = |a: usize| (b.max[a] - b.min[a]).min(h) as f64;
+                    (0..3).map(side).product::<f64>() / (edge(b.level) as f64).powi(3)
                 };
                 let at_surface = each * (h as f64).powi(2) / face;
                 at_surface <= most && boxes.iter().all(|b| in_box(b) <= most)
@@ -114,7 +113,7 @@ impl Estimate<'_> {
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
-        let mut bins: Vec<Bin> = comm.sparse_all_to_all(messages).values().collect();
+        let mut bins: Vec<Bin> = comm.sparse_all_to_all(messages).values();
         let boxed = |interval| area::of_boxes(self.rules, fine, light, &interval);
         bins.extend(rough.intervals().flat_map(boxed));
         combine(&mut bins, u64::wrapping_add);
@@ -122,21 +121,15 @@ impl Estimate<'_> {
     }
 
     /// The bins of all ranks, the same on all ranks, by octants of a level; in boxes by larger ones as far as these have no more leaves than a
-    /// `per_rank`-th of a rank's share. In that, leaves in boxes count as `in_boxes`: as none for base leaves, which METIS takes for octants of
+    /// `per_rank`-th of a rank's share. In that, leaves in boxes count as `boxed`: as none for base leaves, which METIS takes for octants of
     /// one level. Before the bins the number of leaves that need not be resolved further after that, at least 1. Collective.
-    fn all_bins(
-        &self,
-        local: &[Bin],
-        level: Level,
-        in_boxes: u64,
-        per_rank: u64,
-    ) -> (u64, Vec<Bin>) {
+    fn all_bins(&self, local: &[Bin], level: Level, boxed: u64, per_rank: u64) -> (u64, Vec<Bin>) {
         let comm = self.comm;
         let shift = 3 * (LEVEL_MAX - level);
         let coarse = local.iter().map(|b| [b[0] >> shift << shift, b[1]]).collect();
         let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
-        let light = ((leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank)).max(1);
+        let light = ((leaves(&bins) + boxed) / (comm.size() as u64 * per_rank)).max(1);
         bins.extend(area::of_boxes(self.rules, level, light, &curve::ALL));
         combine(&mut bins, u64::wrapping_add);
         ((leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK)).max(1), bins)

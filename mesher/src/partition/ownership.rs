@@ -12,9 +12,10 @@
 
 mod redistribute;
 
-use crate::partition::curve::Boundary;
+use crate::partition::curve::{ALL, Boundary};
 use bricks::brick::Brick;
-use bricks::octant::{LEVEL_MAX, Level, morton, position, start57};
+use bricks::brickset::ones;
+use bricks::octant::{LEVEL_MAX, Level, corner, edge, start57};
 use bricks::tree::{PerLevel, Tree};
 use std::ops::Range;
 use std::sync::Arc;
@@ -102,9 +103,8 @@ impl Ownership {
 
     /// The level-19 codes that this rank owns, in order.
     pub fn intervals(&self) -> impl Iterator<Item = Range<u64>> + '_ {
-        let owned = move |&(_, &(_, owner)): &(usize, &Boundary)| Some(owner) == self.rank;
-        let own = self.boundaries.iter().enumerate().filter(owned);
-        own.map(move |(interval, &(start, _))| start..self.end(interval))
+        let own = self.boundaries.iter().filter(|boundary| Some(boundary.1) == self.rank);
+        own.map(|boundary| self.interval_at(boundary.0).0)
     }
 
     /// The longest of them; at the start of the curve if this rank owns nothing.
@@ -123,47 +123,51 @@ impl Ownership {
         self.boundaries[self.at(start)].1
     }
 
+    /// The interval that contains a level-19 code, and its owner.
+    #[inline]
+    pub fn interval_at(&self, start: u64) -> (Range<u64>, usize) {
+        let interval = self.at(start);
+        let (start, owner) = self.boundaries[interval];
+        (start..self.boundaries.get(interval + 1).map_or(ALL.end, |next| next.0), owner)
+    }
+
     /// The ranks whose octants touch this rank's over a face, an edge or a corner; each with the level-19 code of one of this
     /// rank's octants that it touches.
     pub fn neighbours(&self) -> Vec<(usize, u64)> {
         let mut found = vec![false; self.ranks];
         let mut neighbours = Vec::new();
         for (l, code) in self.octants() {
-            let p = position(code).map(i64::from);
-            let mut add = |owner: usize| {
+            let extent = corner(l, code).map(|min| (min, min + edge(l)));
+            self.owners_in(0, 0, &extent, &mut |owner| {
                 if Some(owner) != self.rank && !std::mem::replace(&mut found[owner], true) {
                     neighbours.push((owner, start57(l, code)));
                 }
-            };
-            for step in (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]) {
-                let touching: [i64; 3] = std::array::from_fn(|a| p[a] + i64::from(step[a]));
-                // After a step up only the lower children touch, after a step down only the upper ones.
-                let touches = |_, child: u64| {
-                    (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 })
-                };
-                if touching.iter().all(|c| (0..1 << l).contains(c)) {
-                    self.owners_in(l, morton(touching.map(|c| c as u32)), &touches, &mut add);
-                }
-            }
+            });
         }
         neighbours
     }
 
-    /// Calls `found` with the owner of an octant. If it has several, the same for each of its children that is accepted, given by level and
-    /// code; some owners are found more than once.
+    /// Calls `found` with the owners of those octants in the given one that an extent reaches, all of them closed; with some more than
+    /// once. The extent reaches the given octant.
     pub fn owners_in(
         &self,
         l: Level,
         code: u64,
-        accepts: &impl Fn(Level, u64) -> bool,
+        extent: &[(i64, i64); 3],
         found: &mut impl FnMut(usize),
     ) {
-        let interval = self.at(start57(l, code));
-        if self.end(interval) >= start57(l, code + 1) {
-            return found(self.boundaries[interval].1);
+        let (interval, owner) = self.interval_at(start57(l, code));
+        if interval.end >= start57(l, code + 1) {
+            return found(owner);
         }
-        for child in (code << 3..).take(8).filter(|&child| accepts(l + 1, child)) {
-            self.owners_in(l + 1, child, accepts, found);
+        let (min, half) = (corner(l, code), edge(l + 1));
+        let reached = (0..3).fold(u8::MAX, |reached, a| {
+            let (middle, lower) = (min[a] + half, [0x55, 0x33, 0x0f][a]);
+            let of = |is_reached: bool, children: u8| if is_reached { children } else { 0 };
+            reached & (of(extent[a].0 <= middle, lower) | of(extent[a].1 >= middle, !lower))
+        });
+        for child in ones(reached.into()) {
+            self.owners_in(l + 1, code << 3 | u64::from(child), extent, found);
         }
     }
 
@@ -233,12 +237,6 @@ impl Ownership {
     #[inline]
     pub fn at(&self, start: u64) -> usize {
         self.boundaries.partition_point(|b| b.0 <= start) - 1
-    }
-
-    /// The end of an interval.
-    #[inline]
-    fn end(&self, interval: usize) -> u64 {
-        self.boundaries.get(interval + 1).map_or(1 << (3 * LEVEL_MAX), |next| next.0)
     }
 }
 

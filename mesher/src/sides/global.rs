@@ -42,7 +42,7 @@ fn group_forest(pairs: Pairs, comm: &dyn Comm) -> Pairs {
     let first = comm.rank() / group * group;
     let mut messages = MessageBuffer::default();
     messages.write_values(first, &forest(&pairs));
-    let received: Vec<_> = comm.sparse_all_to_all(messages).values().collect();
+    let received: Vec<_> = comm.sparse_all_to_all(messages).values();
     forest(&received)
 }
 

@@ -72,7 +72,7 @@ fn enclosed_by_boundary(mine: &[Facet], comm: &dyn Comm) -> f64 {
     };
     let out = edges.filter(|[from, to]| from != to).map(entry).collect();
     let received = uncounted(comm, || comm.sparse_all_to_all(MessageBuffer::of_entries(out)));
-    let mut edges: Vec<[u64; 3]> = received.values().collect();
+    let mut edges: Vec<[u64; 3]> = received.values();
     edges.sort_unstable();
     let odd = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
     let odd: Vec<[u64; 3]> = odd.map(|same| same[0]).collect();

@@ -101,10 +101,10 @@ impl Ownership {
             for others in [0..local.start, local.end..set.len()] {
                 let mut first = others.start;
                 while first < others.end {
-                    let interval = self.at(brick_start(l, set.brick(first).key));
-                    let same_owner = first..position(self.end(interval));
+                    let (interval, owner) = self.interval_at(brick_start(l, set.brick(first).key));
+                    let same_owner = first..position(interval.end);
                     first = same_owner.end;
-                    out.queue(set_index, set, same_owner, self.boundaries[interval].1);
+                    out.queue(set_index, set, same_owner, owner);
                 }
             }
             return local;

@@ -1,4 +1,5 @@
 use super::*;
+use bricks::octant::position;
 use bricks::tree::PerLevel;
 use proptest::prelude::*;
 use ranks::{Comm, sim};
