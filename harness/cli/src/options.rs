@@ -166,6 +166,8 @@ impl MeshArguments {
     pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>), Failure> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
+            let why = format!("{} is meshed already: omit --engine", self.mesh);
+            Failure::unless(self.engine.engine == "mesher", why)?;
             let case = self.case.as_deref().map(Case::read).transpose()?;
             return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }

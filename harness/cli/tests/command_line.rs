@@ -159,6 +159,11 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["gate", "--baseline", file], "neither a program that can be executed nor"),
         (&["gate", "--candidate", file], "neither a program that can be executed nor"),
         (&["gate", "--budget", "nan"], "a whole number of seconds"),
+        (&["bench", "--network", "2e-6,10GB,1e10"], "as in 2e-6,1e10"),
+        (&["bench", "--network", "2e-6,inf"], "as in 2e-6,1e10"),
+        (&["bench", "--show", "--network", "1e-6,1e9"], "cannot be used with"),
+        (&["shrink", file, "--test-only", "--out", "x"], "cannot be used with"),
+        (&["why", place.path().to_str().unwrap(), "0,0,0", "--engine", "x"], "is meshed already"),
     ] {
         let output = harness(arguments);
         let message = String::from_utf8(output.stderr).unwrap();

@@ -74,9 +74,11 @@ impl Catalogue {
             };
             // A directory of results has the name of its case, so names must be unique.
             if selected.iter().any(|other| other.name == case.name) {
-                let same_stem = |other: &&Selected| other.path.file_stem() == case.path.file_stem();
-                let count = selected.iter().filter(same_stem).count();
-                case.name = format!("{}-{}", case.name, count + 1);
+                let is_free = |name: &String| selected.iter().all(|other| other.name != *name);
+                case.name = (2..)
+                    .map(|n| format!("{}-{n}", case.name))
+                    .find(is_free)
+                    .expect("a number is free");
             }
             selected.push(case);
         }

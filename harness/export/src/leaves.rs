@@ -68,6 +68,8 @@ impl Leaves {
             }
             Ok(())
         })?;
+        let why = "the mesh has 2^32 cells or more: select some, as with --clip";
+        Failure::unless(u32::try_from(words.len()).is_ok(), why)?;
         Ok(Self::new(words))
     }
 
@@ -76,7 +78,6 @@ impl Leaves {
         let mut cells = 0u32;
         let number = |word: &u64| {
             let number = cells;
-            // So many cells would take hundreds of gigabytes.
             cells = cells.checked_add(u32::from(word & 3 != CUT)).expect("fewer than 2^32 cells");
             number
         };

@@ -32,8 +32,8 @@ pub struct Change {
 /// Smaller steps are ignored; a fraction of the value.
 const EFFECT_MIN: f64 = 0.001;
 
-/// Minimum number of values: two on either side of a step.
-const VALUES_MIN: usize = 4;
+/// Minimum number of values: two on either side of a step, and one more to measure the noise.
+pub const VALUES_MIN: usize = 5;
 
 /// Values of the autocorrelation that are tried.
 const PHIS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.75, 0.9];

@@ -36,16 +36,12 @@ pub struct Base {
 }
 
 impl Base {
-    /// Reads a case file; writes its geometry into `directory`. If they are given, its generator makes a number of facets for each of so many
+    /// Reads a case file; writes its geometry into `place`. If they are given, its generator makes a number of facets for each of so many
     /// ranks.
     ///
     /// # Errors
     /// If the case is invalid, it has no generator for other facets, or the directory cannot be written.
-    pub fn read(
-        path: &Path,
-        per_rank: Option<[usize; 2]>,
-        directory: &Path,
-    ) -> Result<Self, Failure> {
+    pub fn read(path: &Path, per_rank: Option<[usize; 2]>, place: &Path) -> Result<Self, Failure> {
         let mut case = Case::read(path)?;
         let mut table = PlainCase::read(path)?.table;
         let (mut name, mut stem) = (case.name.clone(), case.name.clone());
@@ -59,11 +55,11 @@ impl Base {
                 Failure::input(format!("{file}: facets cannot grow without a [generator]"))
             })?;
             generator.insert("facets".into(), (all as i64).into());
-            let path = directory.join(format!("{stem}.toml"));
+            let path = place.join(format!("{stem}.toml"));
             fs::write(&path, of_file.to_string()).map_err(|error| Failure::at(&path, error))?;
             (case, table) = (Case::read(&path)?, PlainCase::read(&path)?.table);
         }
-        let stl = directory.join(format!("{stem}.stl"));
+        let stl = place.join(format!("{stem}.stl"));
         File::create(&stl)
             .and_then(|file| geometries::write_stl_binary(&case.facets, BufWriter::new(file)))
             .map_err(|error| Failure::at(&stl, error))?;
@@ -75,7 +71,7 @@ impl Base {
             layer_cells_min: case.layer_cells_min,
             table,
             root: case.root,
-            directory: directory.to_owned(),
+            directory: place.to_owned(),
         })
     }
 

@@ -158,7 +158,7 @@ pub enum Comm {
 }
 
 /// Whether a clock can show all of these times.
-fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
+pub(super) fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
     times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 
@@ -347,7 +347,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it has ranks and a wall time, which is at most that of the launcher and at least that of any phase, times that a clock can show, and sums
+    /// Whether it has ranks, at most a million, and a wall time, which is at most that of the launcher and at least that of any phase, times that a clock can show, and sums
     /// that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
@@ -361,7 +361,7 @@ impl Run {
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
         let off = rounding(setup.ranks * phases.len(), total);
         let slowest = phases.iter().map(|phase| phase.wall_s.max).fold(0.0, f64::max);
-        setup.ranks > 0
+        (1..=1_000_000).contains(&setup.ranks)
             && *time_wall_s > 0.0
             && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
             && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)

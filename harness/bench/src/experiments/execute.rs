@@ -215,31 +215,25 @@ mod tests {
     }
 
     /// The run of a shell script in a directory with the case file `case.toml`; `more` continues the table [run].
-    fn run_in(
-        place: &Path,
-        script: &str,
-        more: &str,
-        comm: Comm,
-        warm_up: bool,
-    ) -> Result<Run, String> {
-        std::fs::write(place.join("engine.sh"), script).unwrap();
+    fn run_in(at: &Path, script: &str, more: &str, comm: Comm, warm: bool) -> Result<Run, String> {
+        std::fs::write(at.join("engine.sh"), script).unwrap();
         let words =
             "serial = ['sh', '{program}', '{case}']\nsimulated = ['sh', '{program}', '{case}']\n";
         let text = format!(
             "about = 'x'\nprogram = '{{here}}/engine.sh'\n[run]\n{words}out = ['{{out}}']\n{more}"
         );
-        let file = place.join("scripted.toml");
+        let file = at.join("scripted.toml");
         std::fs::write(&file, text).unwrap();
         let limit = Duration::from_secs(60);
         let file = file.to_str().unwrap();
         let programs = Programs::find(file, &Given::default()).unwrap();
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
-        let runner = Runner { programs: &programs, launcher: &launcher, limit, place };
+        let runner = Runner { programs: &programs, launcher: &launcher, limit, place: at };
         let setup = crate::testing::run(comm, 1, &[("a", &[0.0, 0.0])]).setup;
         let ranks = if comm == Comm::Solo { 1 } else { 2 };
         let setup = Setup { engine: programs.engine.label(), ranks, ..setup };
-        let case = place.join("case.toml");
-        runner.run(&setup, &case, (!warm_up).then_some(0)).map_err(|why| format!("{why:?}"))
+        let case = at.join("case.toml");
+        runner.run(&setup, &case, (!warm).then_some(0)).map_err(|why| format!("{why:?}"))
     }
 
     #[test]

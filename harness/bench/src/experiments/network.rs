@@ -1,6 +1,6 @@
 //! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
-use super::entry::Network;
+use super::entry::{Network, are_times};
 use super::execute::Runner;
 use contract::number::number;
 use run::engine::process::{self, Watch};
@@ -74,10 +74,14 @@ fn parse(text: &str) -> Result<Network, String> {
 /// # Errors
 /// The expected format.
 pub fn given(text: &str) -> Result<Network, String> {
-    let numbers = text.split(',').filter_map(|w| w.trim().parse::<f64>().ok());
-    let values: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
+    let numbers = text.split(',').map(|word| word.trim().parse::<f64>());
+    let values = numbers.collect::<Result<Vec<f64>, _>>().unwrap_or_default();
     match values[..] {
-        [latency_s, bandwidth_bytes_per_s] if latency_s >= 0.0 && bandwidth_bytes_per_s > 0.0 => {
+        // Of an empty message, and of one more byte.
+        [latency_s, bandwidth_bytes_per_s]
+            if bandwidth_bytes_per_s.is_finite()
+                && are_times([latency_s, 1.0 / bandwidth_bytes_per_s]) =>
+        {
             Ok(Network { latency_s, bandwidth_bytes_per_s, measured: false })
         }
         _ => {

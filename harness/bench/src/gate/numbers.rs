@@ -124,7 +124,7 @@ fn compare(
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
     let is_shared = |name: &String| old.contains_key(name) && new.contains_key(name);
     let mut counters = names.iter().filter(|name| **name != CELLS).peekable();
-    if counters.peek().is_some() && !counters.any(|name| is_shared(name)) {
+    if names.is_empty() || counters.peek().is_some() && !counters.any(|name| is_shared(name)) {
         let why = format!("no quantity but {CELLS} is in both programs' reports");
         findings.push(noted(&layer.to_string(), Verdict::Missing, why));
     }

@@ -44,14 +44,15 @@ pub struct Subject {
 }
 
 impl Subject {
-    fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
+    fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self, Failure> {
+        engine.require()?;
         let program = digest_of(engine.files());
         let measured = Measured { named, revision, program };
-        Self { engine, measured, counted: RefCell::default() }
+        Ok(Self { engine, measured, counted: RefCell::default() })
     }
 
-    /// The candidate that the options name. By default it is the working tree, built in the same way, if the baseline
-    /// is a revision, and else the engine's own program.
+    /// The candidate that the options name. By default it is a program given for the engine; else the working tree, built in the same way, if
+    /// the baseline is a revision; else the engine's own program.
     ///
     /// # Errors
     /// If the program is missing or does not build.
@@ -62,7 +63,9 @@ impl Subject {
     ) -> Result<Self, Failure> {
         let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
         let own = engine.program.to_string_lossy();
-        let default = if is_built { WORKING_TREE } else { &own };
+        let default = if is_built && !engine.is_given { WORKING_TREE } else { &own };
+        let is_one = options.candidate.is_none() || !engine.is_given;
+        Failure::unless(is_one, "--candidate and --mesher name two candidates: give one of them")?;
         let named = options.candidate.as_deref().unwrap_or(default);
         if named == own {
             engine.require()?;
@@ -84,7 +87,7 @@ impl Subject {
             Failure::unless(!is_started || mode & 0o111 != 0, why)?;
             // A link may lead to a program that behaves by its own name, as those of a virtual environment do.
             let program = std::path::absolute(named)?;
-            return Ok(Self::new(engine.with_program(program)?, named.to_owned(), None));
+            return Self::new(engine.with_program(program)?, named.to_owned(), None);
         }
         let (name, repository) = (&description.name, &options.repository);
         let build = description.build.as_ref().ok_or_else(|| {
@@ -98,7 +101,7 @@ impl Subject {
         let revision = git(repository, &arguments).ok_or_else(why)?;
         let built = (named != WORKING_TREE).then_some(revision.as_str());
         let program = program(build, built, repository)?;
-        Ok(Self::new(engine.with_program(program)?, named.to_owned(), Some(revision)))
+        Self::new(engine.with_program(program)?, named.to_owned(), Some(revision))
     }
 }
 

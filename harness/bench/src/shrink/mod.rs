@@ -10,6 +10,7 @@ pub mod probe;
 pub mod reduce;
 
 use contract::failure::Failure;
+use contract::files::Staging;
 use contract::plain::StlForm;
 use probe::{Fault, Judged, Trial};
 use reduce::size;
@@ -98,15 +99,19 @@ pub fn shrink(
     Ok(shrunk)
 }
 
-/// Writes `case.toml`, `body.stl` and `README.md` into a directory; returns the text of the README. `options` choose the program in the
-/// command that repeats the failure.
+/// Writes `case.toml`, `body.stl` and `README.md` into a new directory, which appears when they are complete; returns the text of the README.
+/// `options` choose the program in the command that repeats the failure.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write(shrunk: &Shrunk, options: &[&str], directory: &Path) -> io::Result<String> {
-    fs::create_dir_all(directory)?;
-    let case = shrunk.trial.case.write(directory, StlForm::Any)?;
-    let case = case.display().to_string();
+pub fn write(
+    shrunk: &Shrunk,
+    options: &[&str],
+    staging: &Staging,
+    directory: &Path,
+) -> io::Result<String> {
+    shrunk.trial.case.write(staging.path(), StlForm::Any)?;
+    let case = directory.join("case.toml").display().to_string();
     let words = ["harness", "shrink", &case, "--test-only", "--check", &shrunk.fault.check];
     // Arguments of a process contain no NUL, the one character that a shell cannot quote.
     let line = shlex::try_join(words.into_iter().chain(options.iter().copied()));
@@ -124,7 +129,11 @@ pub fn write(shrunk: &Shrunk, options: &[&str], directory: &Path) -> io::Result<
         shrunk.trials,
         size(&shrunk.trial)
     );
-    fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
+    fs::write(staging.path().join("README.md"), format!("# A case that fails\n\n{text}"))?;
+    staging.publish(|made| {
+        fs::create_dir_all(directory.parent().unwrap_or(directory))?;
+        fs::rename(made, directory)
+    })?;
     Ok(text)
 }
 

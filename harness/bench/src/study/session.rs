@@ -411,14 +411,15 @@ impl Session<'_> {
         let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {
             let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
-            // Whether the mesher can be run is not a property of this engine.
-            let expected = self.runner.run(&setup, &point.case, None);
-            if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
-                let (digest, of_definition) = (&run.digest, expected.digest);
-                return Err(Failure::input(format!(
-                    "the mesh has digest {digest}, but that of the definition has {of_definition}"
-                )));
-            }
+            let expected = self.runner.run(&setup, &point.case, None).map_err(|failure| {
+                let why = "the mesh was not compared with that of the definition, because the mesher failed";
+                Failure { why: format!("{why}: {}", failure.why), ..failure }
+            })?;
+            let (digest, of_definition) = (&run.digest, &expected.digest);
+            let why = format!(
+                "the mesh has digest {digest}, but that of the definition has {of_definition}"
+            );
+            Failure::unless(digest == of_definition, why)?;
         }
         let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
         let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.meshes);

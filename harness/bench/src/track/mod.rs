@@ -14,6 +14,7 @@ pub mod history;
 use crate::gate::report::change_percent;
 use history::Record;
 use serde::Serialize;
+pub use statistics::change_points::VALUES_MIN;
 use statistics::change_points::{Change as Step, change_points};
 use statistics::comparison::adjusted;
 use std::collections::BTreeSet;

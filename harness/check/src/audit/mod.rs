@@ -117,16 +117,11 @@ pub fn audit_against(dir: &Path, case: Option<&Case>, promises: &Promises) -> Au
     audit_within(NODES_MAX, dir, case, promises)
 }
 
-fn audit_within(
-    nodes_max: usize,
-    dir: &Path,
-    case: Option<&Case>,
-    promises: &Promises,
-) -> AuditReport {
+/// The same with room for `most` nodes of the tree.
+fn audit_within(most: usize, dir: &Path, case: Option<&Case>, promises: &Promises) -> AuditReport {
     let start = Instant::now();
     let mut report = AuditReport::default();
-    let read =
-        Mesh::open(dir).and_then(|mesh| Pass::over(&mesh, nodes_max).map(|pass| (mesh, pass)));
+    let read = Mesh::open(dir).and_then(|mesh| Pass::over(&mesh, most).map(|pass| (mesh, pass)));
     report.time_read_s = start.elapsed().as_secs_f64();
     match read {
         Ok((mesh, pass)) => {

@@ -150,6 +150,9 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     let place = tempfile::tempdir()?;
     let temporary = place.path().join("replay.jsonl");
     let record = record.as_deref().unwrap_or(&temporary);
+    let is_in_archive =
+        fs::canonicalize(nearest_directory(record))?.starts_with(fs::canonicalize(&**archive)?);
+    Failure::unless(!is_in_archive, "--record is in the archive: give a file elsewhere")?;
     let outcome = execute(&session, record, &mut study, &arguments.programs)?;
     if outcome.interrupted {
         return Ok(EXIT_INTERRUPTED);

@@ -35,7 +35,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME|FILE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Print the tables of an existing record without measuring
-    #[arg(long, conflicts_with_all = ["engine", "repeat"])]
+    #[arg(long, conflicts_with_all = ["engine", "repeat", "network", "no_mpi", "launcher"])]
     show: bool,
     #[command(flatten)]
     session: SessionOptions,
@@ -228,7 +228,10 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let without = left_out.find(has_none).filter(|_| !study.series.is_empty());
     let why = match study.series.is_empty() {
         true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured".to_owned(),
-        false if runs.is_empty() => "nothing was measured: request fewer cells".to_owned(),
+        false if runs.is_empty() => {
+            "nothing was measured of the study: request fewer cells, or name another record"
+                .to_owned()
+        }
         _ => match without {
             Some(name) => format!("nothing was measured of {name}: the report says why"),
             None => return EXIT_HOLDS,

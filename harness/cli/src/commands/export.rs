@@ -60,6 +60,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let ending = format.ending;
         return Err(Failure::input(format!("{name} has no effect on {ending}: omit it")));
     }
+    if format.ending != "/polyMesh" {
+        files::check_writable(file).map_err(|error| Failure::at(file, error))?;
+    }
     let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;

@@ -26,8 +26,8 @@ use std::thread;
 /// Verifies and benchmarks oct-tree meshers.
 ///
 /// Exit codes: 0 success; 1 a check failed, two meshes differ or a target was missed; 2 invalid input, or a file that cannot be
-/// read or written; 3 a required program or file is missing; 4 standard output cannot be written; 70 a bug; 71 memory ran out;
-/// 130 interrupted by a signal.
+/// read or written; 3 a required program or file is missing, or something that was asked for could not be checked; 4 standard
+/// output cannot be written; 70 a bug; 71 memory ran out; 130 interrupted by a signal.
 #[derive(Debug, Parser)]
 #[command(version = env!("VERSION"), verbatim_doc_comment)]
 pub struct Arguments {

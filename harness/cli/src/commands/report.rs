@@ -89,8 +89,8 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let lines = read(&records)?;
     if lines.is_empty() {
-        let why = "has no record; make one with harness bench";
-        return Err(format!("no results to report: {} {why}", directory.display()));
+        let place = given.first().map_or(directory, PathBuf::as_path).display();
+        return Err(format!("no results to report: {place} has none; harness bench makes them"));
     }
     let written = report(directory, &lines).map_err(|error| error.to_string())?;
     if lines.iter().all(|line| line.run().is_none()) {
@@ -130,11 +130,14 @@ pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = std::fs::read_dir(directory)
         .map_err(|error| format!("{}: {error}", directory.display()))?;
     let has_schema = |text: Vec<u8>| text.windows(13).any(|part| part == b"octree-bench/");
-    let is_record = |path: &PathBuf| {
-        path.extension().is_some_and(|e| e == "jsonl")
-            && files::read_log(path).is_ok_and(has_schema)
-    };
-    let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_record).collect();
+    let mut found = Vec::new();
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let named = |error| format!("{}: {error}", path.display());
+        let is_of_lines = path.extension().is_some_and(|ending| ending == "jsonl");
+        if is_of_lines && has_schema(files::read_log(&path).map_err(named)?) {
+            found.push(path);
+        }
+    }
     found.sort();
     Ok(found)
 }

@@ -5,6 +5,7 @@ use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{fault, shrink, write};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::files::{Staging, nearest_directory};
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     check: Option<String>,
     /// Only test whether the case fails
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["out", "budget"])]
     test_only: bool,
     /// Directory for the reduced case [default: shrunk-CASE]
     #[arg(short, long, value_name = "DIR")]
@@ -50,6 +51,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let EngineArguments { engine, programs: given } = &arguments.engine;
     let programs = arguments.engine.find()?;
+    programs.engine.require()?;
+    if programs.engine.description.promises.definition {
+        programs.reference.require()?;
+    }
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
@@ -63,6 +68,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let why = "is there already: remove it, or give another directory with --out";
         return Err(Failure::about(&out, why));
     }
+    let named = |error| Failure::at(&out, error);
+    let staging = Staging::inside(nearest_directory(&out)).map_err(named)?;
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::read(&path)?, ranks };
     let judged = probe.judge(&trial)?;
@@ -83,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let mut options = vec!["--engine", engine];
     let mesher = given.mesher.as_deref().map(Path::to_string_lossy);
     options.extend(mesher.iter().flat_map(|mesher| ["--mesher", mesher]));
-    let readme = write(&shrunk, &options, &out).map_err(|error| Failure::at(&out, error))?;
+    let readme = write(&shrunk, &options, &staging, &out).map_err(named)?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

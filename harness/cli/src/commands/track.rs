@@ -5,7 +5,7 @@ use crate::output::put_forms;
 use bench::experiments::machine;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
-use bench::track::{Series, analyse};
+use bench::track::{Series, VALUES_MIN, analyse};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::json::pretty;
@@ -91,6 +91,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         println!("not in the last record: {} metrics, such as {}", ended().count(), first.name);
     }
     print!("{}", summary(&all));
+    let few = all.iter().filter(|series| series.points.len() < VALUES_MIN).count();
+    if few > 0 {
+        println!(
+            "in {few} metrics no step can be found yet: they have fewer than {VALUES_MIN} values"
+        );
+    }
     let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
     let is_worse = |series: &&Series| series.worse_recently(recent).is_some();
     let worse: Vec<&str> = all.iter().filter(is_worse).map(|series| &*series.name).collect();

@@ -99,16 +99,11 @@ pub fn family() {
     table.finish("failing calls");
 }
 
-/// Runs a program with a fault; returns its end and its calls.
-fn inject(
-    program: &Program,
-    injector: &Path,
-    place: &Place,
-    fault: [&str; 3],
-) -> (Ended, Vec<String>) {
+/// Runs a program with a fault, which the injector `with` makes; returns its end and its calls.
+fn inject(program: &Program, with: &Path, place: &Place, fault: [&str; 3]) -> (Ended, Vec<String>) {
     let log = place.beside("log");
     let (dir, log_name) = (place.path().to_str().unwrap(), log.to_str().unwrap());
-    let command = program.command(injector, &[&fault[..], &[dir, log_name]].concat(), place);
+    let command = program.command(with, &[&fault[..], &[dir, log_name]].concat(), place);
     let ended = place.run(command, program.limit());
     let calls = fs::read_to_string(&log).unwrap_or_default();
     (ended, calls.lines().map(str::to_owned).collect())

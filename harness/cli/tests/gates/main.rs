@@ -41,6 +41,30 @@ fn a_passing_case_is_not_shrunk() {
     assert_eq!(fixture.harness(&format!("{SHRINK} --test-only")).code, 1);
 }
 
+/// Whatever the command: the interpreter of the engine file is not there.
+#[test]
+fn a_missing_interpreter_is_missing() {
+    let fixture = Fixture::new();
+    let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    fixture.write(
+        "engine.toml",
+        &engine.replace("[\"{program}\"", "[\"no-such-python\", \"{program}\""),
+    );
+    let gate = "gate --engine engine.toml --rules gate.toml";
+    let verify = "verify case.toml --engine engine.toml --no-mpi";
+    for command in
+        [gate, &format!("{gate} --baseline engine"), verify, &format!("{SHRINK} --test-only")]
+    {
+        let outcome = fixture.harness(command);
+        assert_eq!(outcome.code, 3, "{command}: {}", outcome.printed);
+        assert!(
+            outcome.printed.contains("no-such-python is not on the PATH"),
+            "{}",
+            outcome.printed
+        );
+    }
+}
+
 #[test]
 fn shrinking_replaces_no_file() {
     let fixture = Fixture::new();
@@ -133,14 +157,7 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     let fixture = Fixture::new();
     let git = |arguments: &str| {
         let mut command = Command::new("git");
-        command.args([
-            "-c",
-            "user.name=a",
-            "-c",
-            "user.email=a@b",
-            "-c",
-            "init.defaultBranch=main",
-        ]);
+        command.args(["-c", "user.name=a", "-c", "user.email=b", "-c", "init.defaultBranch=main"]);
         assert!(
             command
                 .args(arguments.split(' '))
@@ -226,6 +243,12 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
         assert_eq!(outcome.code, 1, "{}", outcome.printed);
         assert!(outcome.printed.contains(change), "{}", outcome.printed);
     }
+    fixture.program("given", program);
+    fixture.write("words", "47");
+    let given = fixture.harness(&format!("{gate} --baseline HEAD~1 --mesher given"));
+    assert!(given.printed.contains("words 40 -> 47"), "{}", given.printed);
+    let two = fixture.harness(&format!("{gate} --baseline HEAD~1 --candidate HEAD --mesher given"));
+    assert_eq!(two.code, 2, "{}", two.printed);
     let again = fixture.harness(&format!("{gate} --baseline HEAD~1 --candidate HEAD"));
     assert!(!again.printed.contains("building"), "{}", again.printed);
     let elsewhere = fixture.harness(&format!("{} --baseline HEAD~1", gate.replace("other/", ".")));
@@ -255,6 +278,13 @@ fn a_gate_that_compared_nothing_is_not_green() {
         fixture.harness(&format!("{} --baseline engine", gate.replace("counters", "instructions")));
     assert_eq!(other.code, 3, "{}", other.printed);
     assert!(other.printed.contains("the rules have no case for instructions"), "{}", other.printed);
+    // Neither program says how much memory it takes, and the engine file says that they do.
+    let description = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    fixture.write("engine.toml", &description.replace("[run]", "reports_memory = true\n[run]"));
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"memory\"]\n");
+    let memory = gate.replace("--layers counters", "--baseline engine --candidate engine");
+    let memory = fixture.harness(&memory);
+    assert_eq!(memory.code, 3, "{}", memory.printed);
     fixture.write("gate.toml", "[tolerance]\ncounters = 0.0\n");
     let none = fixture.harness(&format!("{gate} --baseline engine"));
     assert_eq!(none.code, 2, "{}", none.printed);

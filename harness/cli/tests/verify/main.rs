@@ -209,6 +209,19 @@ fn a_mesher_whose_serial_runs_differ_is_reported() {
     assert!(outcome.printed.contains(why), "{}", outcome.printed);
 }
 
+/// The timed run writes no mesh, so that only the run with one shows how many cells there are.
+#[test]
+fn a_wrong_number_of_cells_of_the_timed_run_is_reported() {
+    let fixture = Fixture::new();
+    fixture.script_mpirun();
+    let lie = "[ -n \"$out\" ] || sed -i 's/\"cells\": 1/\"cells\": 7/' \"$json\"";
+    fixture.script("mesher", &format!("{HOLDS}\n{lie}"));
+    let outcome = fixture.verify(&[]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    let why = "serial: deterministic: two serial runs differ: 7 cells";
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
+}
+
 #[test]
 fn a_wrong_digest_in_manifest_and_report_on_ranks_is_reported() {
     let fixture = Fixture::new();

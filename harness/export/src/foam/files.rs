@@ -111,14 +111,10 @@ impl<'a> ListFile<'a> {
         }
     }
 
-    /// Adds a list of `count` items. A list without items has no parentheses.
-    fn list<T: NoUninit>(
-        &mut self,
-        count: u64,
-        items: impl Iterator<Item = T>,
-    ) -> Result<(), Failure> {
-        let [begin, end] = if count == 0 { [""; 2] } else { ["(", ")"] };
-        write!(self.out, "{count}\n{begin}")?;
+    /// Adds a list of `n` items. A list without items has no parentheses.
+    fn list<T: NoUninit>(&mut self, n: u64, items: impl Iterator<Item = T>) -> Result<(), Failure> {
+        let [begin, end] = if n == 0 { [""; 2] } else { ["(", ")"] };
+        write!(self.out, "{n}\n{begin}")?;
         for (item, number) in items.zip(0..) {
             self.options.check_at(number)?;
             self.out.write_all(bytemuck::bytes_of(&item))?;

@@ -51,8 +51,8 @@ pub struct Mesh {
 /// # Panics
 /// If an invariant of the answer is violated: see [`Faces::check_invariants`].
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
-    let of_mesh = read(export)?;
     require_new(path)?;
+    let of_mesh = read(export)?;
     let named = |error| Failure::at(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let dir = staging.path().join("polyMesh");

@@ -93,14 +93,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
-/// The file up to the appended data, filled up with blanks to `length` bytes.
-fn header(
-    root: &Root,
-    arrays: &[Array],
-    pieces: &[Piece],
-    digest: Digest,
-    length: usize,
-) -> String {
+/// The file up to the appended data, filled up with blanks to that many bytes.
+fn header(root: &Root, arrays: &[Array], pieces: &[Piece], digest: Digest, bytes: usize) -> String {
     let Root { origin: [x, y, z], edge } = root;
     // VTK reads text as the codes of its characters.
     let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
@@ -117,7 +111,7 @@ fn header(
         describe(arrays, piece, &mut xml);
     }
     let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
-    let blanks = length.saturating_sub(xml.len() + end.len());
+    let blanks = bytes.saturating_sub(xml.len() + end.len());
     xml + &" ".repeat(blanks) + end
 }
 

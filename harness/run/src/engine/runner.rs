@@ -101,19 +101,23 @@ impl Engine {
         &self.description.name
     }
 
-    /// Refuses to go on if the program is missing.
+    /// Refuses to go on if the program is missing, or what the command starts instead, such as an interpreter.
     ///
     /// # Errors
     /// What to do about it.
     pub fn require(&self) -> Result<(), contract::failure::Failure> {
-        if self.program.is_file() {
-            return Ok(());
-        }
         let (name, path) = (self.name(), self.program.display());
         let option = if name == "reference" { name } else { "mesher" };
-        let why = format!(
-            "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
-        );
+        let first = fill(&self.description.run.serial[0], &self.places);
+        let why = match self.program.is_file() {
+            true if first.contains(['/', '{']) || on_path(&first).is_some() => return Ok(()),
+            true => format!(
+                "{first} is not on the PATH: install it, or correct `serial` in the engine file {name}"
+            ),
+            false => format!(
+                "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
+            ),
+        };
         Err(contract::failure::Failure::missing(why))
     }
 

@@ -101,13 +101,8 @@ impl<'a> CaseRun<'a> {
     }
 
     /// Adds results of the crate `check`.
-    pub fn add_results(
-        &mut self,
-        subject: &str,
-        layout: Option<&Layout>,
-        results: Vec<CheckResult>,
-    ) {
-        for result in results {
+    pub fn add_results(&mut self, subject: &str, layout: Option<&Layout>, all: Vec<CheckResult>) {
+        for result in all {
             let mut check = Check::of_result(subject, result);
             check.figures.take_if(|_| layout.is_some());
             self.add(check, layout);

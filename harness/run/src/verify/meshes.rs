@@ -157,7 +157,8 @@ impl CaseRun<'_> {
             return;
         }
         let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
-        let outcome = match *first == second {
+        let is_same = *first == second && timed.cells == mesh.words.len() as u64;
+        let outcome = match is_same {
             true => Outcome::held(mesh.words.len() as u64),
             false => Outcome::fail(format!(
                 "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
@@ -236,7 +237,7 @@ impl CaseRun<'_> {
         }
         let mut hangs = 0;
         for layout in self.all.options.layouts(self.engine()) {
-            match self.verify_layout(case, serial, &layout) {
+            match self.verify_on(case, serial, &layout) {
                 Ok(()) => {}
                 Err(failure) if failure.is_interrupt() => return,
                 Err(failure) => {
@@ -261,12 +262,7 @@ impl CaseRun<'_> {
         }
     }
 
-    fn verify_layout(
-        &mut self,
-        case: &Case,
-        serial: &LeafSet,
-        layout: &Layout,
-    ) -> Result<(), Failure> {
+    fn verify_on(&mut self, case: &Case, serial: &LeafSet, layout: &Layout) -> Result<(), Failure> {
         let subject = layout.to_string();
         self.step(&subject);
         let choices = [&layout.partitioner, &layout.level_base].into_iter().flatten();

@@ -50,12 +50,7 @@ impl Points {
     }
 
     /// Corner 0 of the lower face is this corner of the other one; of the two ways to continue, trees remain right-handed in one.
-    fn glue(
-        &mut self,
-        (tree, face): (usize, usize),
-        (other, its): (usize, usize),
-        orientation: usize,
-    ) {
+    fn glue(&mut self, (tree, face): (usize, usize), (other, its): (usize, usize), turn: usize) {
         let (a, b) = (self.face(face), self.face(its));
         let minus = |p: [i64; 3], q: [i64; 3]| [0, 1, 2].map(|i| p[i] - q[i]);
         let outward = |face: usize, sign: i64| {
@@ -71,8 +66,8 @@ impl Points {
         };
         let own: Vec<[i64; 3]> =
             a[1..].iter().take(self.dimension - 1).map(|&c| minus(c, a[0])).collect();
-        let start = b[orientation];
-        let steps = |i: usize| minus(b[orientation ^ i], start);
+        let start = b[turn];
+        let steps = |i: usize| minus(b[turn ^ i], start);
         let image = match self.dimension {
             2 => vec![steps(1)],
             _ => [[steps(1), steps(2)], [steps(2), steps(1)]]

@@ -174,7 +174,8 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
     let expected = [("left_wing", 6), ("body", 24 - 4 - 4), ("tail", 6)];
     assert_eq!(faces[6..], expected.map(|(name, faces)| (name.to_owned(), faces)));
     options.case = Some(&other);
-    let error = write(&whole(&mesh, &options), &target).unwrap_err().to_string();
+    let error =
+        write(&whole(&mesh, &options), &dir.path().join("other/polyMesh")).unwrap_err().to_string();
     assert!(error.contains("not of the case"), "{error}");
 }
 
