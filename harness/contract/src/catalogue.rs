@@ -174,6 +174,7 @@ mod tests {
         write("catalogue.toml", CATALOGUE);
         write("cube_small.toml", "[generator]\nshape = \"cube\"\nfacets = 12");
         write("jet.toml", "geometry = \"fetched/jet.stl\"");
+        write("cube_small-2.toml", "");
         let here = place.path().to_string_lossy();
         let arguments: Vec<String> =
             arguments.iter().map(|argument| argument.replace("HERE", &here)).collect();
@@ -228,6 +229,10 @@ mod tests {
         let three = ["cube_small", "cube_small", "HERE/cube_small.toml"];
         let expected = [("cube_small", false), ("cube_small-2", false), ("cube_small-3", false)];
         assert_eq!(select(&three, &[]), cases(&expected));
+        // A name that a number would make may be there already.
+        let taken = ["HERE/cube_small-2.toml", "cube_small", "HERE/cube_small.toml"];
+        let expected = [("cube_small-2", false), ("cube_small", false), ("cube_small-3", false)];
+        assert_eq!(select(&taken, &[]), cases(&expected));
         assert_eq!(select(&[], &[Size::Large, Size::Medium]), cases(&[("jet", true)]));
     }
 
