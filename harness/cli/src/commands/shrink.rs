@@ -69,7 +69,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return Err(Failure::about(&out, why));
     }
     let named = |error| Failure::at(&out, error);
-    let staging = Staging::inside(nearest_directory(&out)).map_err(named)?;
+    let staging = || Staging::inside(nearest_directory(&out)).map_err(named);
+    let staging = (!arguments.test_only).then(staging).transpose()?;
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::read(&path)?, ranks };
     let judged = probe.judge(&trial)?;
@@ -80,10 +81,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         }
         return Ok(EXIT_HOLDS);
     };
-    if arguments.test_only {
+    let Some(staging) = staging else {
         println!("{first}");
         return Ok(EXIT_FAILED);
-    }
+    };
     eprintln!("harness shrink: the case fails {first}");
     let limit = Duration::from_secs(arguments.budget);
     let shrunk = shrink(trial, &first, limit, |trial| probe.judge(trial))?;

@@ -39,6 +39,8 @@ fn a_passing_case_is_not_shrunk() {
     assert_eq!(outcome.code, 0, "{}", outcome.printed);
     assert!(!fixture.path("tiny").exists());
     assert_eq!(fixture.harness(&format!("{SHRINK} --test-only")).code, 1);
+    let nowhere = fixture.harness(&format!("{SHRINK} --out nowhere/deep/tiny"));
+    assert!(nowhere.code == 1 && fixture.path("nowhere/deep/tiny/README.md").is_file());
 }
 
 /// Whatever the command: the interpreter of the engine file is not there.
