@@ -347,8 +347,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it has ranks, at most a million, and a wall time, which is at most that of the launcher and at least that of any phase, times that a clock can show, and sums
-    /// that are those of the ranks and of the phases.
+    /// Whether it has ranks, at most a million, and a wall time, which is at most that of the launcher and at least that of any phase;
+    /// times that a clock can show; and sums that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
