@@ -29,6 +29,8 @@ pub enum Shape {
     Uav,
     /// A fighter: chined fuselage, hollow intakes and nozzles, trapezoid wings, two canted fins.
     Fighter,
+    /// The fighter on its landing gear, as that of the paper.
+    FighterGear,
     /// Two equal cubes that overlap in a corner.
     BoxesOverlapping,
     /// A cubic shell: the inside is the wall around a sealed cubic cavity.
@@ -55,6 +57,7 @@ impl fmt::Display for Shape {
             Self::Pipe => "pipe",
             Self::Uav => "uav",
             Self::Fighter => "fighter",
+            Self::FighterGear => "fighter_gear",
             Self::BoxesOverlapping => "boxes_overlapping",
             Self::BoxInBox => "box_in_box",
             Self::ThreeSpheres => "three_spheres",
@@ -96,7 +99,7 @@ pub struct Generator {
     #[serde(default)]
     pub angle: Option<f64>,
     /// `plate`: along x, default 1. `pipe` and `pipes_crossing`: of each straight section, default 5
-    /// times `radius`. `uav`, `fighter` and `car`: the longest edge of the bounding box, default 1.
+    /// times `radius`. `uav`, `fighter`, `fighter_gear` and `car`: the longest edge of the bounding box, default 1.
     #[serde(default)]
     pub length: Option<f64>,
     /// `plate`: along y, default 0.5.

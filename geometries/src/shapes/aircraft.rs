@@ -86,8 +86,8 @@ impl Body for Uav {
 }
 
 /// A fighter similar to the F-22 of the paper: chined nose, canopy, two hollow intakes, swept
-/// trapezoidal wings, tailplanes, two canted fins and two hollow nozzles. The unit is its length.
-pub(super) struct Fighter {
+/// trapezoidal wings, tailplanes, two canted fins and two hollow nozzles; with `GEAR`, landing gear. The unit is its length.
+pub(super) struct Fighter<const GEAR: bool> {
     nose: Vec<RoundCone>,
     canopy: Vec<RoundCone>,
     engine: RoundCone,
@@ -96,11 +96,14 @@ pub(super) struct Fighter {
     wing: Panel,
     tailplane: Panel,
     fin: Panel,
+    /// Legs and pairs of wheels.
+    gear: Vec<RoundCone>,
     radius_least: f64,
 }
 
-impl Body for Fighter {
-    const BOUNDS: [Vec3; 2] = [[-0.01, -0.38, -0.08], [1.01, 0.38, 0.21]];
+impl<const GEAR: bool> Body for Fighter<GEAR> {
+    const BOUNDS: [Vec3; 2] =
+        [[-0.01, -0.38, if GEAR { -0.14 } else { -0.08 }], [1.01, 0.38, 0.21]];
     const FACETS_TIMES_SQUARE: f64 = 7.55;
 
     fn new(radius_least: f64) -> Self {
@@ -156,6 +159,14 @@ impl Body for Fighter {
                 0.180,
                 [section(0.660, 0.860, 0.0065), section(0.785, 0.868, 0.0028)],
             ),
+            gear: [
+                ([0.270, 0.0, -0.02], [0.285, 0.0, -0.105], 0.005),
+                ([0.285, 0.007, -0.105], [0.285, 0.013, -0.105], 0.015),
+                ([0.610, 0.062, -0.02], [0.620, 0.080, -0.100], 0.007),
+                ([0.620, 0.080, -0.100], [0.620, 0.094, -0.100], 0.022),
+            ]
+            .map(|(from, to, radius)| RoundCone::new(from, r(radius), to, r(radius)))
+            .into(),
             radius_least,
         }
     }
@@ -173,6 +184,7 @@ impl Body for Fighter {
         let surfaces = blend(self.wing.distance(p), self.tailplane.distance(p), 0.004);
         let solid = blend(blend(hull, boom, 0.008), surfaces, 0.014);
         let solid = blend(solid, self.fin.distance(p), 0.010);
+        let solid = if GEAR { blend(solid, nearest(&self.gear, p), 0.003) } else { solid };
         let half = [0.110, 0.026, 0.029].map(|size: f64| (size - self.radius_least).max(0.004));
         let intake = rounded_box(p, [0.250, 0.078, -0.004], half, 0.003);
         carve(solid, join(intake, self.nozzle.distance(p)))

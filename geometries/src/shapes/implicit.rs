@@ -362,7 +362,7 @@ mod tests {
             }
         }
         compare::<super::super::aircraft::Uav>();
-        compare::<super::super::aircraft::Fighter>();
+        compare::<super::super::aircraft::Fighter<true>>();
     }
 
     #[test]
