@@ -164,7 +164,9 @@ fn of_base_mesh(
 ) -> Result<Partition, Error> {
     let depth =
         division.level_base.unwrap_or(PAPER_DEPTH).clamp(1, initial::level_last(rules).max(1));
-    let mut base = Rules { level_surface: depth.min(rules.level_surface), ..rules.clone() };
+    let level_surface = depth.min(rules.level_surface);
+    // A leaf of the base mesh with a seed may cross.
+    let mut base = Rules { level_surface, seeds: Vec::new(), ..rules.clone() };
     base.boxes.iter_mut().for_each(|b| b.level = b.level.min(depth));
     let facets = gather(comm, facets);
     let options = Options { ungraded: true, ..Options::default() };

@@ -114,7 +114,7 @@ impl SelectionArguments {
         let (root, ranks) = (&mesh.manifest.root, mesh.parts.len());
         if let Some(rank) = rank {
             mesh.require_ranks()?;
-            let why = format!("--rank {rank}: the mesh has ranks 0 to {}", ranks - 1);
+            let why = format!("--rank {rank}: the mesh has {ranks} ranks, from 0 on");
             Failure::unless((rank as usize) < ranks, why)?;
         }
         let are_known = side.is_none() || mesh.manifest.sides == Sides::Known;

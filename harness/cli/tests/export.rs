@@ -85,7 +85,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("part.vtkhdf", &["--side", "outside", "--level-max", "2"], "no leaf satisfies"),
         ("part.vtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
-        ("part.vtu", &["--rank", "2"], "--rank 2: the mesh has ranks 0 to 1"),
+        ("part.vtu", &["--rank", "2"], "--rank 2: the mesh has 2 ranks, from 0 on"),
         ("part.vtu", &["--label", "64"], "--label has no effect on .vtu"),
         ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
         ("polyMesh", &[], "one that ends in .vtu, .p8est, /polyMesh"),

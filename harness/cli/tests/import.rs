@@ -56,6 +56,9 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
     assert!(output.contains("106 compared"), "{output}");
     let (code, output, _) = result(&["diff", &forest, &sample("brick.p8est"), "--ignore-root"]);
     assert!(code == 1 && output.contains("the leaves differ"), "{output}");
+    let (code, _, error) =
+        result(&["diff", &forest, second.to_str().unwrap(), "--position", "centre"]);
+    assert!(code == 2 && error.contains("the position of cells is for tables"), "{error}");
     // An existing mesh is not overwritten.
     let (code, _, error) = result(&arguments);
     assert!(code == 2 && error.contains("not empty"), "{error}");

@@ -2,15 +2,15 @@
 
 /// A length with three significant digits.
 pub fn number(x: f64) -> String {
-    if x == 0.0 {
-        return "0".into();
-    }
-    let digits = 2 - x.abs().log10().floor() as i32;
-    if (-3..=6).contains(&digits) {
-        format!("{x:.*}", digits.max(0) as usize)
-    } else {
-        format!("{x:.2e}")
-    }
+    let is_short = x == 0.0 || (1e-4..1e6).contains(&x.abs());
+    if is_short { digits(x) } else { format!("{x:.2e}") }
+}
+
+/// Three significant digits, and all before the decimal point.
+pub fn digits(value: f64) -> String {
+    let magnitude = if value == 0.0 { 2.0 } else { value.abs().log10().floor() };
+    let decimals = (2.0 - magnitude).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
 }
 
 /// A number with thousands separators.

@@ -36,9 +36,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };
     // The root, then the groups of siblings as the file numbers them.
     let families = families.levels.concat();
-    let shown =
-        families.iter().map(|family| (0xff & !(family.split | family.deleted)).count_ones());
-    let shown: u64 = shown.map(u64::from).sum();
+    let shown = |[split, deleted, ..]: &[u8; 4]| u64::from((split | deleted).count_zeros());
+    let shown: u64 = families.iter().map(shown).sum();
     assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
@@ -49,10 +48,10 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
             options.check()?;
             let mut window = Window::new(index);
             if index == 0 {
-                window.put_root(families[0]);
+                window.put_root(siblings(families[0]));
             }
             for group in groups(index).take_while(|&group| group + 1 < families.len() as u64) {
-                window.put(group, families[group as usize + 1]);
+                window.put(group, siblings(families[group as usize + 1]));
             }
             out.add(index, &window.compress(&shape, &mut deflater)).map_err(named)?;
         }
@@ -61,10 +60,16 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
-/// Families of siblings, level by level; level 0 has the root in place of the first of its family.
+/// Eight siblings of four bytes instead of four words.
+fn siblings(family: [u8; 4]) -> Siblings {
+    let [split, deleted, crossing, inside] = family.map(u64::from);
+    Siblings { split, deleted, crossing, inside }
+}
+
+/// Families of siblings, level by level, each as the bits split, deleted, crossing and inside; level 0 has the root in place of the first of its family.
 #[derive(Debug, Default)]
 struct Families {
-    levels: Vec<Vec<Siblings>>,
+    levels: Vec<Vec<[u8; 4]>>,
     /// Morton code of the last leaf. Its family and those of the octants that contain it are the last ones of their levels.
     key: u64,
 }
@@ -79,24 +84,24 @@ impl Families {
         self.key = key;
         self.levels.resize_with(self.levels.len().max(level + 1), Vec::new);
         for level in new..=level {
-            self.levels[level].push(Siblings { deleted: 0xff, ..Siblings::default() });
+            self.levels[level].push([0, 0xff, 0, 0]);
         }
         for level in new.saturating_sub(1)..level {
-            let (family, bit) = self.last(level, key);
-            family.split |= bit;
-            family.deleted &= !bit;
+            let ([split, deleted, ..], bit) = self.last(level, key);
+            *split |= bit;
+            *deleted &= !bit;
         }
-        let (family, bit) = self.last(level, key);
-        family.deleted &= !bit;
+        let ([_, deleted, crossing, inside], bit) = self.last(level, key);
+        *deleted &= !bit;
         match leaf.side {
-            Side::Crossing => family.crossing |= bit,
-            Side::Inside => family.inside |= bit,
+            Side::Crossing => *crossing |= bit,
+            Side::Inside => *inside |= bit,
             Side::Outside => {}
         }
     }
 
     /// The last family of a level, and the bit of the octant in it that contains a level-19 cell.
-    fn last(&mut self, level: usize, key: u64) -> (&mut Siblings, u64) {
+    fn last(&mut self, level: usize, key: u64) -> (&mut [u8; 4], u8) {
         let digit = if level == 0 { 0 } else { (key / word::span(level as u8)) & 7 };
         let family = self.levels[level].last_mut().expect("families are added from the root on");
         (family, 1 << digit)

@@ -68,7 +68,7 @@ impl Leaves {
             }
             Ok(())
         })?;
-        let why = "the mesh has 2^32 cells or more: select some, as with --clip";
+        let why = "the mesh has 2^32 leaves or more, of which this format needs all, selected or not: write .vtu or .vtkhdf";
         Failure::unless(u32::try_from(words.len()).is_ok(), why)?;
         Ok(Self::new(words))
     }

@@ -11,7 +11,7 @@ use contract::case::Case;
 use contract::digest::Digest;
 use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use contract::import::cells::Cells;
-use contract::import::{self, Format, ImportedTree, Request};
+use contract::import::{self, Format, ImportedTree, Position, Request};
 use contract::lattice::Root;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{self, Manifest, Tree};
@@ -78,6 +78,8 @@ pub fn import(
     let root = request.root.or(case.map(|case| case.root));
     parts(path).iter().try_for_each(|part| files::register_input(part))?;
     let format = format.map_or_else(|| import::guess(path), Ok).map_err(input)?;
+    let has_use = format == Format::Table || request.position == Position::default();
+    Failure::unless(has_use, "the position of cells is for tables: omit it").map_err(input)?;
     if format == Format::Vtk {
         let sides = request.sides.as_deref();
         let tree = ImportedTree::open(path, sides, root, case, program.clone());

@@ -192,7 +192,10 @@ fn serve(comm: &dyn Comm) -> i32 {
     loop {
         interrupt::begin();
         // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end.
-        let next = (comm.rank() == 0).then(|| lines.next()).flatten();
+        let is_line = |line: &io::Result<_>| {
+            !line.as_ref().is_err_and(|e| e.kind() != ErrorKind::InvalidData)
+        };
+        let next = (comm.rank() == 0).then(|| lines.next()).flatten().filter(is_line);
         let line = next.map_or(String::new(), |line| line.unwrap_or_default() + "\n");
         comm.next_run();
         let line = uncounted(comm, || text_of_first(comm, &line));

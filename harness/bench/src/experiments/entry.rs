@@ -5,6 +5,7 @@
 //! and counts are plain numbers in the units of their names; values over the ranks are stored as sum and maximum, and
 //! rank by rank only for useful times on up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
+use super::network::ASSUMED;
 use crate::jsonl;
 use jiff::Timestamp;
 use run::engine::report::SECONDS_MAX;
@@ -133,11 +134,16 @@ pub struct Network {
     pub latency_s: f64,
     /// Bandwidth of a long message, in bytes per second.
     pub bandwidth_bytes_per_s: f64,
-    /// Whether a ping-pong measured them; otherwise the user gave them.
+    /// Whether a ping-pong measured them; otherwise the user gave them, or they are [`ASSUMED`].
     pub measured: bool,
 }
 
 impl Network {
+    /// Whether the user gave them.
+    pub(crate) fn is_given(&self) -> bool {
+        !self.measured && *self != ASSUMED
+    }
+
     /// Returns the time of a rank's messages, in seconds.
     pub(crate) fn time_s(&self, messages: f64, bytes: f64) -> f64 {
         messages * self.latency_s + bytes / self.bandwidth_bytes_per_s

@@ -8,7 +8,7 @@ use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::description::is_own;
-use run::engine::layout::{Launcher, Layout, Ranks, RunOptions};
+use run::engine::layout::{Launcher, Layout, Ranks, RunOptions, node_count};
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine, Programs};
 use std::ffi::OsStr;
@@ -79,7 +79,8 @@ impl Runner<'_> {
             program: machine::digest_of(engine.files()),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
-            oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
+            oversubscribed: setup.comm == Comm::Mpi
+                && setup.ranks > machine::cores() * node_count(),
             command: shown(&command),
             facets: report.facets,
             geometry: report.geometry.map(|geometry| geometry.digest),
@@ -116,14 +117,15 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
     // Cells, and with them time and memory, grow with the inverse square of the spacing.
     let growth = (finest.setup.spacing_min / setup.spacing_min).powi(2);
     let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
-    let memory = lines.iter().find_map(Line::session)?.machine.memory_bytes as f64;
+    let memory =
+        lines.iter().find_map(Line::session)?.machine.memory_bytes as f64 * node_count() as f64;
     let [needed, available] = [bytes, memory].map(|b| b / 1e9);
     let would = match () {
         () if time_s > limit.as_secs_f64() => {
             format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())
         }
         () if bytes > memory => {
-            format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB")
+            format!("need {needed:.0} GB of memory, and there are {available:.0} GB")
         }
         () => return None,
     };

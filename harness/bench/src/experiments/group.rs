@@ -88,17 +88,15 @@ impl Group {
         Median { value, low, high, ..repeated }
     }
 
-    /// Returns the CPU time of the whole process, in seconds; `None` if a run does not have it.
+    /// Returns the CPU time of the whole process, in seconds; `None` if it is unknown in a run.
     pub fn cpu_s(&self) -> Option<Median> {
-        self.median_of(|run| Some(run.time_cpu_s).filter(|time| *time != 0.0))
+        // A launcher such as srun has its own, as ranks are not its children.
+        self.median_of(|run| Some(run.time_cpu_s).filter(|time| *time > 0.9 * run.useful_s.sum))
     }
 
     /// Returns the CPU time of the geometry search, in seconds; `None` if the program does not report it.
     pub fn search_s(&self) -> Option<Median> {
-        self.median_of(|run| {
-            let search = run.phases.iter().filter(|phase| phase.name == "search");
-            search.map(|phase| phase.useful_s.sum).reduce(|a, b| a + b)
-        })
+        self.median_of(|run| Some(run.phases.iter().find(|p| p.name == "search")?.useful_s.sum))
     }
 
     /// Whether more ranks than cores ran.
@@ -397,7 +395,7 @@ fn apart(
 ) -> Setup {
     let mut setup = run.setup.clone();
     let mut machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
-    if let Some(given) = network.filter(|network| !network.measured) {
+    if let Some(given) = network.filter(|network| network.is_given()) {
         machine += &format!("{given}; ");
     }
     machine += &format!("program {}", run.program);

@@ -336,12 +336,13 @@ impl Tested {
         self.compared.iter().filter(|c| c.at.ranks > self.fitted)
     }
 
-    /// Of the held-out quantities of a kind: the medians of their errors without sign in percents, how many lie in their bands, and how many they are.
-    pub fn summary(&self, kind: Kind) -> (Ends, usize, usize) {
+    /// Of the held-out quantities of a kind, if there are any: the medians of their errors without sign in percents, how many lie in their bands, and how
+    /// many they are.
+    pub fn summary(&self, kind: Kind) -> Option<(Ends, usize, usize)> {
         let of: Vec<&Compared> = self.held_out().filter(|c| c.key.0 == kind).collect();
         let errors = |end: usize| of.iter().map(|c| c.errors()[end].abs()).collect::<Vec<f64>>();
         let held = of.iter().filter(|c| c.error <= self.bands[&c.key]).count();
-        ([0, 1].map(|end| median_of(&errors(end))), held, of.len())
+        (!of.is_empty()).then(|| ([0, 1].map(|end| median_of(&errors(end))), held, of.len()))
     }
 
     /// Quantities of the model with mean and imbalance as formulas.
@@ -407,7 +408,7 @@ mod tests {
             assert_eq!(tested.fitted, 64.0);
             for (kind, held_out) in [(Kind::Counter, 8), (Kind::Phase, 4), (Kind::Run, 4)] {
                 // Times are stored to the microsecond, which is more than the width of such a band.
-                let (errors, _, count) = tested.summary(kind);
+                let (errors, _, count) = tested.summary(kind).unwrap();
                 assert!(errors[0].max(errors[1]) < 1.0, "{kind:?}: {errors:?}");
                 assert_eq!(count, held_out);
             }
@@ -443,6 +444,18 @@ mod tests {
         let few: Vec<&Group> = all.iter().filter(|g| g.setup.ranks <= 8).collect();
         assert!(Tested::of(&few, CASE, 0.25).is_none());
         assert!(Tested::of(&[], CASE, 1.0).is_none());
+    }
+
+    #[test]
+    fn a_model_without_laws_of_counters_has_no_errors_of_them() {
+        // Counters need three numbers of ranks above 8.
+        let of = |n: f64| [2, 4, 8, 16, 64, 256].map(|p| scaled(CASE, n as u64, p));
+        let runs = [1e8, 1e9, 1e10].into_iter().flat_map(of);
+        let groups =
+            Groups::of(&runs.map(|run| line(Entry::Run(Box::new(run)))).collect::<Vec<_>>());
+        let tested = Tested::of(&groups.all.iter().collect::<Vec<_>>(), CASE, 0.25).unwrap();
+        assert_eq!(tested.summary(Kind::Counter), None);
+        assert!(tested.summary(Kind::Run).is_some());
     }
 
     #[test]

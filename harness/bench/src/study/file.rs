@@ -261,11 +261,10 @@ impl Study {
         refuse(&[(is_empty, "it has no [[series]] and no [[row]]")])?;
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
-        for series in &self.series {
-            let case = &series.case;
-            let other = *cases.entry(series.name()).or_insert(case);
-            let why =
-                format!("the cases {other} and {case} have the same name in results: rename one");
+        let of_series = self.series.iter().map(|series| &series.case);
+        for case in of_series.chain(self.mesh.values().map(|mesh| &mesh.case)) {
+            let other = *cases.entry(Path::new(case).file_stem()).or_insert(case);
+            let why = format!("the cases {other} and {case} have the same name: rename one");
             refuse(&[(other != case, &why)])?;
         }
         for (name, Mesh { spacing_min, cells, .. }) in &self.mesh {
@@ -334,7 +333,7 @@ const CHOICES: [Choice; 6] = [
 
 impl Series {
     /// The name of its case in results.
-    fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         let case = Path::new(&self.case).file_stem().unwrap_or_default().to_string_lossy();
         self.facets.map_or(case.clone().into(), |facets| grown(&case, facets))
     }

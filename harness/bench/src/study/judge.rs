@@ -44,15 +44,14 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
-/// Returns the lines of sessions on the same machine, commit and given network as the last one, without runs of other builds of a program
-/// than in its last run.
+/// Returns the lines of sessions on the same machine and given network as the last one, without runs of other builds of a program than in its
+/// last run.
 pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
-    let origin =
-        |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
+    let origin = |line: &Line| line.session().map(|session| session.machine.label());
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let mut sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
-    let given = |(session, network)| (session, Some(network).filter(|of: &Network| !of.measured));
+    let given = |(session, network)| (session, Some(network).filter(Network::is_given));
     let networks: Vec<_> = lines.iter().filter_map(Line::network).map(given).collect();
     if let Some((_, last)) = networks.iter().rfind(|(session, _)| sessions.contains(session)) {
         sessions

@@ -187,7 +187,8 @@ impl Session<'_> {
             load_average: machine::load_average(),
             lacks: self.study.engines().into_iter().map(lacks).collect(),
         };
-        self.append(Entry::Session(Box::new(opening)))
+        self.append(Entry::Session(Box::new(opening)))?;
+        self.options.network.map_or(Ok(()), |given| self.append(Entry::Network(given)))
     }
 
     fn append(&mut self, entry: Entry) -> Result<(), Failure> {
@@ -220,8 +221,9 @@ impl Session<'_> {
                 let why = format!("{engine} cannot run the series {named}");
                 (self.progress)(&why);
                 let (experiment, engine) = (named.clone(), engine.clone());
-                let serial = Setup::serial(&base.name, base.spacing_min, base.layer_cells_min);
-                let setup = Setup { experiment, engine, ..serial };
+                let [weights, partitioner] = <[_; 2]>::from(series.choices()[0]).map(str::to_owned);
+                let serial = Setup::serial(&series.name(), base.spacing_min, layers[0]);
+                let setup = Setup { experiment, engine, weights, partitioner, ..serial };
                 self.append(Entry::LeftOut(NoResult { setup, why }))?;
             }
             let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
@@ -374,8 +376,7 @@ impl Session<'_> {
 
     /// Records the cost of messages, on which all projections depend.
     fn measure_network(&mut self) -> Result<(), Failure> {
-        let measured = || network::measured(&self.runner);
-        let network = match self.options.network.map_or_else(measured, Ok) {
+        let network = match network::measured(&self.runner) {
             Ok(network) => network,
             Err(_) if interrupt::requested() => return Err(Failure::interrupted()),
             Err(why) => {

@@ -16,9 +16,10 @@ use report::json::pretty;
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
-use run::engine::runner::{Engine, Given};
+use run::engine::runner::{Engine, Given, label};
 use std::fs;
 use std::path::{Path, PathBuf};
+use walkdir::WalkDir;
 
 /// `harness archive`.
 #[derive(Args, Debug)]
@@ -53,6 +54,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let why = format!(
             "the record has a run that the study does not ask for, {setup}: give the study that made it"
         );
+        return Err(Failure::input(why));
+    }
+    let names: Vec<String> = of_study.engines().iter().map(|name| label(name)).collect();
+    let mut programs = lines.iter().filter_map(Line::run).map(|run| &run.setup.engine);
+    if let Some(other) = programs.find(|name| !names.contains(name)) {
+        let why = format!("the study does not name {other}, of which the record has runs");
         return Err(Failure::input(why));
     }
     let wrong = |error| Failure::at(out, error);
@@ -94,15 +101,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 /// The paths of the files in a directory and those in it. A link to a directory, which may lead in a circle, counts as a file.
 fn list(directory: &Path) -> Result<Vec<String>, Failure> {
     let mut names = Vec::new();
-    for entry in fs::read_dir(directory).map_err(|error| Failure::at(directory, error))? {
-        let entry = entry?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        match entry.file_type()?.is_dir() {
-            true => {
-                names.extend(list(&entry.path())?.iter().map(|below| format!("{name}/{below}")))
-            }
-            false => names.push(name),
-        }
+    for entry in WalkDir::new(directory).min_depth(1) {
+        let entry = entry.map_err(|error| Failure::at(directory, error.into()))?;
+        let name = entry.path().strip_prefix(directory).expect("it is below");
+        names.extend((!entry.file_type().is_dir()).then(|| name.to_string_lossy().into_owned()));
     }
     names.sort();
     Ok(names)
@@ -175,7 +177,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
 fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
     let paths = Paths::find();
     for name in study.engines().iter().filter(|name| !is_own(name)) {
-        if !Engine::find(name, None, &paths).is_ok_and(|engine| engine.program.is_file()) {
+        if !Engine::find(name, None, &paths).is_ok_and(|engine| engine.require().is_ok()) {
             eprintln!("harness: {name} is not installed here: its runs are left out");
             study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
         }

@@ -48,19 +48,19 @@ fn a_passing_case_is_not_shrunk() {
 fn a_missing_interpreter_is_missing() {
     let fixture = Fixture::new();
     let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
-    fixture.write(
-        "engine.toml",
-        &engine.replace("[\"{program}\"", "[\"no-such-python\", \"{program}\""),
-    );
     let gate = "gate --engine engine.toml --rules gate.toml";
     let verify = "verify case.toml --engine engine.toml --no-mpi";
-    for command in
-        [gate, &format!("{gate} --baseline engine"), verify, &format!("{SHRINK} --test-only")]
+    let commands =
+        [gate, &format!("{gate} --baseline engine"), verify, &format!("{SHRINK} --test-only")];
+    for (command, python) in
+        commands.into_iter().flat_map(|of| [(of, "no-such-python"), (of, "/no/python")])
     {
+        let first = format!("[\"{python}\", \"{{program}}\"");
+        fixture.write("engine.toml", &engine.replace("[\"{program}\"", &first));
         let outcome = fixture.harness(command);
         assert_eq!(outcome.code, 3, "{command}: {}", outcome.printed);
         assert!(
-            outcome.printed.contains("no-such-python is not on the PATH"),
+            outcome.printed.contains(&format!("{python} was not found")),
             "{}",
             outcome.printed
         );

@@ -125,6 +125,21 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
                 && fixture.path("a").join(name).is_file()
         );
     }
+    // A record of a program that would not be run again.
+    fixture.write("series.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\n");
+    let series = fixture.harness("bench series.toml --mesher ./mesher --no-mpi --report series");
+    assert_eq!(series.code, 0, "{}", series.printed);
+    let record = fs::read_to_string(fixture.path("series/record.jsonl")).unwrap();
+    let other = record.replace("\"engine\":\"mesher\"", "\"engine\":\"other\"");
+    assert_ne!(record, other);
+    fixture.write("series/record.jsonl", &other);
+    let other =
+        fixture.harness("archive series series.toml -o b --title T --author A --licence MIT");
+    assert!(
+        other.code == 2 && other.printed.contains("the study does not name other"),
+        "{}",
+        other.printed
+    );
     // What was measured with is not needed any more.
     for name in ["case.toml", "body.stl", "mine.toml"] {
         fs::remove_file(fixture.path(name)).unwrap();

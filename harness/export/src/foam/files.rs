@@ -24,7 +24,7 @@ impl Mesh {
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices = faces.vertices.corners.len() as u64;
         let fits = options.label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
-        let why = "the mesh has more faces than 32-bit labels can number: choose --label 64";
+        let why = "the faces have more vertices than 32 bits can number: select a part, or write a polyMesh with --label 64";
         Failure::unless(fits, why)?;
         let (count, internal) = (faces.count(), faces.neighbour.len());
         let note =

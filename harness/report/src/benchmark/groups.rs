@@ -42,12 +42,9 @@ pub fn repetitions(groups: &[&Group], value: impl Fn(&Group) -> Median) -> Strin
 /// The origin of the times of single ranks, as a sentence.
 pub fn rank_times(groups: &[&Group]) -> String {
     let n = range(groups, |g| g.time_s.count as u64);
-    match groups.iter().all(|g| g.by_rank) {
-        true => format!("Times of a rank in a phase are medians of {n} runs."),
-        false => format!(
-            "Times of a rank in a phase are those of the run of median time among {n}, or medians where all runs report them."
-        ),
-    }
+    format!(
+        "Times of a rank in a phase are medians of {n} runs where all report them, and otherwise of the run of median time."
+    )
 }
 
 /// The least and the greatest value, or the only one.

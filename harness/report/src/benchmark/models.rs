@@ -1,7 +1,6 @@
 //! Models of strong scaling on simulated ranks: their formulas, what they predicted of runs that they had not seen, and figures with bands.
 
 use super::groups::{Subject, cells_label, range};
-use super::numbers::digits;
 use super::scaling::ranks_axis;
 use crate::figure::{Axis, Figure, Point, Provenance, Series};
 use crate::table::Table;
@@ -9,7 +8,7 @@ use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::model::{At, Key, Kind, Tested};
 use bench::order::{by_key, distinct};
-use contract::number::grouped;
+use contract::number::{digits, grouped};
 
 /// Points of a model's line.
 const POINTS: usize = 40;
@@ -47,7 +46,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
         let times = Table { notes, ..table(format!("{title}: seconds"), &times, model) };
         [times, table(format!("{title}: counters"), &counters, model)]
     };
-    models(groups).iter().flat_map(of).collect()
+    models(groups).iter().flat_map(of).filter(|table| !table.rows.is_empty()).collect()
 }
 
 /// What is modelled: program, case, n and a partition that was chosen.
@@ -99,7 +98,7 @@ fn notes(modelled @ (_, of, _, model): &Modelled) -> Vec<String> {
     )];
     let kinds = ["counters", "times of phases", "times of runs"];
     for (what, kind) in kinds.into_iter().zip([Kind::Counter, Kind::Phase, Kind::Run]) {
-        let ([mean, max], held, count) = model.summary(kind);
+        let Some(([mean, max], held, count)) = model.summary(kind) else { continue };
         notes.push(format!("Held-out {what}: means are {mean:.1} % off in the median, maxima {max:.1} %; of these, {held} of {count} are in their bands."));
     }
     notes.extend(far(modelled));

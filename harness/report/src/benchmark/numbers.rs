@@ -11,7 +11,7 @@
 
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
-use contract::number::grouped;
+use contract::number::{digits, grouped};
 use regex::{Captures, Match, Regex};
 use statistics::Median;
 use std::fmt::Write;
@@ -75,14 +75,6 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         unit: "cells",
     };
     quantities.into_iter().filter_map(number).chain([cells]).collect()
-}
-
-/// Three significant digits, and all before the decimal point.
-pub fn digits(value: f64) -> String {
-    let magnitude = value.abs().log10().floor();
-    let decimals =
-        if magnitude.is_finite() { (2.0 - magnitude).clamp(0.0, 9.0) as usize } else { 0 };
-    format!("{value:.decimals$}")
 }
 
 const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \result[interval]{KEY} its interval, \result[coverage]{KEY} the

@@ -4,12 +4,12 @@ use super::groups::{
     Subject, by_subject, cells_label, cited, is_counterpart, point, provenance, range, rank_times,
     repetitions,
 };
-use super::numbers::digits;
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
+use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{Efficiency, Factor, above_one, heaviest_base_leaf, phase_s};
 use bench::order::{by_key, distinct};
-use contract::number::grouped;
+use contract::number::{digits, grouped};
 use contract::paper::{number, speedup as speedup_of_paper};
 
 /// Rank counts of the paper's Figures 21 to 23.
@@ -44,7 +44,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         out.extend(projected(groups, subject, &all, &subject.file()));
     }
     for (subject, all) in by_subject(groups, "weights") {
-        for (_, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
+        for (_, of) in by_key(all, |g| (g.cells(), g.setup.ranks, g.setup.comm)) {
             out.extend(balance(subject, &of));
         }
     }
@@ -271,12 +271,14 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
         false => "Their depth is automatic, so that no partition here is the paper's.",
     };
     let (label, cells) = (cells_label(cells), grouped(cells));
+    let is_sim = of[0].setup.comm == Comm::Sim;
+    let [kind, ending] = if is_sim { ["simulated ranks", ""] } else { ["ranks", "-mpi"] };
     let caption = format!(
-        "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
+        "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} {kind}, by the partitioner of the base \
          tree and the weights of its leaves. {baseline} The counts repeat exactly."
     );
     let names = of.iter().map(|g| g.setup.division()).collect();
-    let id = format!("balance-{}-{label}-{ranks}", subject.file());
+    let id = format!("balance-{}-{label}-{ranks}{ending}", subject.file());
     let title = format!(
         "Load imbalance of cells by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
     );

@@ -2,13 +2,12 @@
 
 use super::groups::Subject;
 use super::models;
-use super::numbers::digits;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
 use bench::experiments::pop::{self, Efficiency, above_one, phase_s};
 use bench::order::{by_key, distinct};
-use contract::number::grouped;
+use contract::number::{digits, grouped};
 
 /// All tables: experiments, projections, phases, models, programs.
 pub fn tables(groups: &Groups) -> Vec<Table> {

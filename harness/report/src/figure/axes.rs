@@ -94,7 +94,7 @@ fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
 }
 
 /// The positions of ticks: those that the axis has; else at most eight multiples of 1, 2 or 5 times a power of ten; on a logarithmic axis
-/// powers of ten and, where there are less than three of them, multiples.
+/// powers of ten; where there are less than three of them, multiples, or the same steps as on others.
 fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     let (low, high) = (range.start, range.end);
     let slack = |v: f64| if axis.log { v.abs() * 1e-9 } else { (high - low) * 1e-9 };
@@ -102,12 +102,16 @@ fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     if !axis.ticks.is_empty() {
         return axis.ticks.iter().copied().filter(inside).collect();
     }
-    if !axis.log {
-        let power = 10f64.powf(((high - low) / 7.0).log10().floor());
-        let steps = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
-        let step = steps.into_iter().find(|step| (high - low) / step <= 7.0).unwrap_or(steps[3]);
+    let equidistant = || -> Vec<f64> {
+        let least = (high - low) / 7.0;
+        let power = 10f64.powf(least.log10().floor());
+        let fits = |factor: &f64| factor * power >= least;
+        let step = power * [1.0, 2.0, 5.0].into_iter().find(fits).unwrap_or(10.0);
         let numbers = (low / step).ceil() as i64..=(high / step).floor() as i64;
-        return numbers.map(|number| number as f64 * step).collect();
+        numbers.map(|number| number as f64 * step).collect()
+    };
+    if !axis.log {
+        return equidistant();
     }
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let multiples = |factors: &[f64]| -> Vec<f64> {
@@ -115,10 +119,9 @@ fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
         all.filter(inside).collect()
     };
     let some = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0];
-    let tenths: Vec<f64> = (10..100).map(|tenths| f64::from(tenths) / 10.0).collect();
     // The coarsest choice with three ticks, and no more of them than have room.
-    let choices = [&[1.0][..], &[1.0, 2.0, 5.0], &some, &tenths].map(multiples);
-    let all = choices.into_iter().find(|c| c.len() > 2).unwrap_or_default();
+    let choices = [&[1.0][..], &[1.0, 2.0, 5.0], &some].map(multiples);
+    let all = choices.into_iter().find(|c| c.len() > 2).unwrap_or_else(equidistant);
     let every = all.len().div_ceil(8).max(1);
     all.into_iter().step_by(every).collect()
 }
@@ -181,6 +184,12 @@ mod tests {
         for value in [0.73, 1.0, 99_522.0, 1e9] {
             assert!(of(&Axis::log(""), &[value]).len() > 2, "{value}");
         }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_of_less_than_a_decade_has_equal_steps() {
+        let steps = of(&Axis::log(""), &[0.92e9, 1.6e9]);
+        assert_eq!(steps, [9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0].map(|step| step * 1e8));
     }
 
     #[test]

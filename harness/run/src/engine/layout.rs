@@ -187,12 +187,16 @@ impl Launcher {
         set_environment(command);
         let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
         // In a job of Slurm, mpirun starts ranks on all of its nodes.
-        let nodes = std::env::var("SLURM_JOB_NUM_NODES").unwrap_or_else(|_| "1".to_owned());
-        if !is_mpirun || self.words[1..] != ["-n", RANKS] || nodes != "1" {
+        if !is_mpirun || self.words[1..] != ["-n", RANKS] || node_count() != 1 {
             return None;
         }
         own_directory(command)
     }
+}
+
+/// Returns the number of machines on which ranks run: that of Slurm's job, else 1.
+pub fn node_count() -> usize {
+    std::env::var("SLURM_JOB_NUM_NODES").ok().and_then(|n| n.parse().ok()).unwrap_or(1)
 }
 
 /// Makes a directory for the files of OpenMPI, which leaves them if its ranks or daemon are killed. `None` if this machine has no

@@ -110,9 +110,10 @@ impl Engine {
         let option = if name == "reference" { name } else { "mesher" };
         let first = fill(&self.description.run.serial[0], &self.places);
         let why = match self.program.is_file() {
-            true if first.contains(['/', '{']) || on_path(&first).is_some() => return Ok(()),
+            // Also an absolute path.
+            true if first.contains('{') || on_path(&first).is_some() => return Ok(()),
             true => format!(
-                "{first} is not on the PATH: install it, or correct `serial` in the engine file {name}"
+                "{first} was not found: install it, or correct `serial` in the engine file {name}"
             ),
             false => format!(
                 "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
@@ -338,15 +339,17 @@ impl Engine {
         self.failure(End::Unusable(why))
     }
 
-    /// The engine's name in results: without directories, unless it would then pass for one of this repository.
+    /// The engine's name in results.
     pub fn label(&self) -> String {
-        let name = self.name();
-        let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
-        match !description::is_own(name) && description::is_own(&stem) {
-            true => name.to_owned(),
-            false => stem.into_owned(),
-        }
+        label(self.name())
     }
+}
+
+/// An engine's name in results: without directories, unless it would then pass for one of this repository.
+pub fn label(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
+    let passes = !description::is_own(name) && description::is_own(&stem);
+    if passes { name.to_owned() } else { stem.into_owned() }
 }
 
 /// Programs that the command line names.

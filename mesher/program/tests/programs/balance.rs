@@ -64,6 +64,20 @@ fn check_times(report: &Value) {
     assert!((1 << 20..1 << 34).contains(&peak), "{peak} bytes");
 }
 
+/// In the base mesh, which is coarser, the first seed lies in a leaf that the wall of the cavity crosses.
+#[test]
+fn the_papers_partition_makes_the_same_mesh_around_seeds() {
+    let workspace = Workspace::new();
+    let case = "spacing_min = 0.07\nlayer_cells_min = 2\nkeep_crossing = false\nroot_scale = 2.1\n
+seeds = [[0.01, 0.02, 0.03], [0.9, -0.9, 0.9]]\n[generator]\nshape = \"box_in_box\"\nfacets = 96\n";
+    workspace.write("case.toml", case);
+    let solo = mesh(&workspace, &["--comm", "solo"]);
+    for depth in ["2", "3", "4"] {
+        let paper = ["--comm", "sim:3", "--preset", "paper", "--level-base", depth];
+        assert_eq!(mesh(&workspace, &paper)["digest"], solo["digest"]);
+    }
+}
+
 #[test]
 fn repartitioning_balances_the_leaves() {
     for (n, crossing) in [("1", "false"), ("4", "true")] {

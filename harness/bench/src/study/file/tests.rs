@@ -156,6 +156,17 @@ fn contradictions_are_reported() {
 }
 
 #[test]
+fn case_files_of_one_name_would_be_meshed_around_one_geometry() {
+    let series = "[[series]]\nexperiment = 'weak'\ncase = 'a/wing.toml'\ncells = [1e4]\nfacets = 9\nsim = [1]\n";
+    let elsewhere = series.replace("a/", "b/").replace("facets = 9\n", "");
+    for other in [elsewhere.as_str(), "[mesh.new]\ncase = 'b/wing.toml'\n"] {
+        let why = read(&format!("{series}{other}")).unwrap_err();
+        assert!(why.contains("wing.toml have the same name: rename one"), "{why}");
+    }
+    assert!(read(&format!("{series}[mesh.new]\ncase = 'a/wing.toml'\n")).is_ok());
+}
+
+#[test]
 fn a_study_asks_for_its_runs_alone() {
     let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\ncells = [1e6]\nsim = [1, 2]\n\
                 [[series]]\nexperiment = 'layers'\ncase = 'cube'\ncells = [1e4]\nlayers = [1, 2]\nsim = [1]\n";
