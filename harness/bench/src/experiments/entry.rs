@@ -5,7 +5,6 @@
 //! and counts are plain numbers in the units of their names; values over the ranks are stored as sum and maximum, and
 //! rank by rank only for useful times on up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
-use super::network::ASSUMED;
 use crate::jsonl;
 use jiff::Timestamp;
 use run::engine::report::SECONDS_MAX;
@@ -137,6 +136,10 @@ pub struct Network {
     /// Whether a ping-pong measured them; otherwise the user gave them, or they are [`ASSUMED`].
     pub measured: bool,
 }
+
+/// The default: a current cluster interconnect.
+pub const ASSUMED: Network =
+    Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
 
 impl Network {
     /// Whether the user gave them.

@@ -12,8 +12,9 @@
 //! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
 //! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::entry::{Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread};
-use super::network::ASSUMED;
+use super::entry::{
+    ASSUMED, Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread,
+};
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
 use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};

@@ -364,9 +364,8 @@ fn quantile(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Entry, Run};
+    use crate::experiments::entry::{ASSUMED, Comm, Entry, Run};
     use crate::experiments::group::Groups;
-    use crate::experiments::network::ASSUMED;
     use crate::testing::{line, run};
 
     /// Work that shrinks with the ranks and messages that grow with them: on N cells, a rank counts N/p work and 3 log2 p messages, and takes

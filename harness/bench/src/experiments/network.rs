@@ -1,6 +1,6 @@
 //! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
-use super::entry::{Network, are_times};
+use super::entry::{ASSUMED, Network, are_times};
 use super::execute::Runner;
 use contract::number::number;
 use run::engine::process::{self, Watch};
@@ -11,10 +11,6 @@ use std::time::Duration;
 
 /// Time after which the ping-pong is killed.
 const PING_PONG_LIMIT: Duration = Duration::from_secs(120);
-
-/// The default: a current cluster interconnect.
-pub const ASSUMED: Network =
-    Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
 
 impl fmt::Display for Network {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

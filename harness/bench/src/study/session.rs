@@ -7,7 +7,7 @@ use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, judge, unjudged};
 use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, now_utc,
+    ASSUMED, Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, now_utc,
 };
 use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Meshes, another_mesh};
@@ -381,7 +381,7 @@ impl Session<'_> {
             Err(_) if interrupt::requested() => return Err(Failure::interrupted()),
             Err(why) => {
                 (self.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
-                network::ASSUMED
+                ASSUMED
             }
         };
         self.append(Entry::Network(network))
