@@ -188,25 +188,24 @@ fn obey(asked: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
 
 /// Runs the command lines that rank 0 reads from its standard input; returns the exit code of this service. Collective.
 fn serve(comm: &dyn Comm) -> i32 {
-    let mut lines = stdin().lines();
+    let (mut lines, is_first) = (stdin().lines(), comm.rank() == 0);
     loop {
         interrupt::begin();
-        // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end.
-        let is_line = |line: &io::Result<_>| {
-            !line.as_ref().is_err_and(|e| e.kind() != ErrorKind::InvalidData)
+        // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end, or why nothing can be read.
+        let text = |line: io::Result<String>| match line {
+            Err(e) if e.kind() != ErrorKind::InvalidData => format!("standard input: {e}"),
+            line => line.unwrap_or_default() + "\n",
         };
-        let next = (comm.rank() == 0).then(|| lines.next()).flatten().filter(is_line);
-        let line = next.map_or(String::new(), |line| line.unwrap_or_default() + "\n");
+        let line = is_first.then(|| lines.next()).flatten().map_or(String::new(), text);
         comm.next_run();
         let line = uncounted(comm, || text_of_first(comm, &line));
-        let Some(line) = line.strip_suffix('\n') else { return 0 };
+        let Some(line) = line.strip_suffix('\n') else {
+            return if line.is_empty() { 0 } else { fail(&Error::input(line), is_first) };
+        };
         // The peak of this run alone; where that is impossible, it includes those before it.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
-        let code = match served(line) {
-            Ok(args) => run(&args, comm),
-            Err(e) => fail(&e, comm.rank() == 0),
-        };
-        if comm.rank() == 0 {
+        let code = served(line).map_or_else(|e| fail(&e, is_first), |args| run(&args, comm));
+        if is_first {
             // Who does not read answers asks for no further run.
             let _ = writeln!(stdout(), "{code}");
         }

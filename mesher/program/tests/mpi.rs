@@ -94,6 +94,14 @@ fn a_run_of_a_service_is_a_run_of_its_own() {
         r#"["torus.toml", "--json", "last.json", "--out", "last"]"#,
     ];
     workspace.write("torus.toml", CASE);
+    let mut unreadable = Command::new("sh");
+    unreadable.args(["-c", &format!("exec '{}' --serve < .", crate::process::MESHER)]);
+    unreadable.current_dir(workspace.path());
+    let ended = run(unreadable);
+    assert!(
+        ended.code == Some(2) && ended.stderr.starts_with("mesher: standard input: "),
+        "{ended:?}"
+    );
     workspace.write("lines", lines.join("\n"));
     for ranks in [1, 3] {
         let mpirun = workspace.mpirun(ranks, &["--serve"]);
