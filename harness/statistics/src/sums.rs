@@ -28,36 +28,42 @@ impl Sum {
         self.terms.iter().map(|(term, coefficient)| coefficient * terms[*term]).sum()
     }
 
-    /// The sum of at most so many terms that extrapolates best, the shortest one of several; if it may have all, that of all which are not
-    /// subtracted. `None` without values at three places.
-    pub fn fit(rows: &[Row], most: usize) -> Option<Self> {
+    /// The sum that extrapolates best of at most so many `kinds` of terms, the shortest one of several; if it may have all, that of all which are not
+    /// subtracted. Terms of one kind are chosen together. `None` without values at three places.
+    pub fn fit(rows: &[Row], kinds: &[usize], most: usize) -> Option<Self> {
         let mut places: Vec<f64> = rows.iter().map(|row| row.0).collect();
         places.sort_by(f64::total_cmp);
         places.dedup();
         let [_, .., before, last] = places[..] else { return None };
-        let count = rows[0].2.len();
+        let of_kinds = |chosen: &[usize]| {
+            (0..kinds.len()).filter(|term| chosen.contains(&kinds[*term])).collect::<Vec<_>>()
+        };
+        let all = Products::of(rows);
+        let count = kinds.iter().max().map_or(0, |last| last + 1);
         if most >= count {
-            return Some(Self::of_terms(rows, (0..count).collect()));
+            return Some(Self::of_terms(&all, (0..kinds.len()).collect()));
         }
         places.retain(|place| (before.min(0.5 * last)..last).contains(place));
-        let split = |cut: &f64| rows.iter().cloned().partition(|row| row.0 <= *cut);
-        let splits: Vec<(Vec<Row>, Vec<Row>)> = places.iter().map(split).collect();
+        let split = |cut: &f64| {
+            let (known, further): (Vec<Row>, _) = rows.iter().cloned().partition(|r| r.0 <= *cut);
+            (Products::of(&known), further)
+        };
+        let splits: Vec<(Products, Vec<Row>)> = places.iter().map(split).collect();
         let candidate = |chosen: Vec<usize>| {
-            let sum = |rows: &[Row]| Self::of_terms(rows, chosen.clone());
-            let beyond = |(known, further): &(Vec<Row>, Vec<Row>)| sum(known).error(further);
-            (splits.iter().map(beyond).sum::<f64>().max(EXACT), sum(rows))
+            let chosen = of_kinds(&chosen);
+            let sum = |of: &Products| Self::of_terms(of, chosen.clone());
+            let beyond = |(known, further): &(Products, Vec<Row>)| sum(known).error(further);
+            (splits.iter().map(beyond).sum::<f64>().max(EXACT), sum(&all))
         };
         let all = choices(count, most).into_iter().map(candidate);
         all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sum)| sum)
     }
 
     /// The least squares of these terms: while some would be subtracted, the one of which most would be is left out.
-    fn of_terms(rows: &[Row], mut chosen: Vec<usize>) -> Self {
+    fn of_terms(of: &Products, mut chosen: Vec<usize>) -> Self {
         loop {
-            let only = |row: &Row| (row.0, row.1, chosen.iter().map(|term| row.2[*term]).collect());
-            let rows: Vec<Row> = rows.iter().map(only).collect();
-            let found = least_squares(&rows);
-            let added = |i: usize| found[i] * rows.iter().map(|row| row.0 * row.2[i]).sum::<f64>();
+            let found = of.least_squares(&chosen);
+            let added = |i: usize| found[i] * of.sums[chosen[i]];
             match (0..found.len()).min_by(|i, j| added(*i).total_cmp(&added(*j))) {
                 Some(least) if found[least] <= 0.0 => _ = chosen.remove(least),
                 _ => return Self { terms: chosen.into_iter().zip(found).collect() },
@@ -72,36 +78,54 @@ impl Sum {
     }
 }
 
-/// All choices of one to so many terms, the shorter ones first. The bits of a number say which.
-fn choices(terms: usize, most: usize) -> Vec<Vec<usize>> {
-    let choice = |number: u64| (0..terms).filter(|i| number >> i & 1 == 1).collect();
-    let mut all: Vec<Vec<usize>> = (1..1 << terms).map(choice).collect();
+/// All choices of one to so many of `count`, the shorter ones first. The bits of a number say which.
+fn choices(count: usize, most: usize) -> Vec<Vec<usize>> {
+    let choice = |number: u64| (0..count).filter(|i| number >> i & 1 == 1).collect();
+    let mut all: Vec<Vec<usize>> = (1..1 << count).map(choice).collect();
     all.retain(|of| of.len() <= most);
     all.sort_by_key(Vec::len);
     all
 }
 
-/// The coefficients of terms whose sums have the least square errors, each with its row's weight; 0 for one that is the same as those before it.
-fn least_squares(rows: &[Row]) -> Vec<f64> {
-    let count = rows.first().map_or(0, |row| row.2.len());
-    // The value is the last column. The normal equations are solved by Gauss-Jordan elimination.
-    let column = |row: &Row, i: usize| row.2.get(i).copied().unwrap_or(row.1);
-    let product = |i: usize, j: usize| -> f64 {
-        rows.iter().map(|row| row.0 * column(row, i) * column(row, j)).sum()
-    };
-    let equation = |i: usize| (0..=count).map(|j| product(i, j)).collect();
-    let mut equations: Vec<Vec<f64>> = (0..count).map(equation).collect();
-    for i in 0..count {
-        let pivot = equations[i][i];
-        let scale = if pivot > INDEPENDENT * product(i, i) { 1.0 / pivot } else { 0.0 };
-        let scaled: Vec<f64> = equations[i].iter().map(|entry| scale * entry).collect();
-        for equation in &mut equations {
-            let factor = equation[i];
-            equation.iter_mut().zip(&scaled).for_each(|(entry, of)| *entry -= factor * of);
+/// What least squares need of rows, all weighted.
+struct Products {
+    /// The sum of each column.
+    sums: Vec<f64>,
+    /// The scalar product of each two columns, the last of which is the value.
+    of: Vec<Vec<f64>>,
+}
+
+impl Products {
+    fn of(rows: &[Row]) -> Self {
+        let count = rows.first().map_or(0, |row| row.2.len());
+        let column = |row: &Row, i: usize| row.2.get(i).copied().unwrap_or(row.1);
+        let sum = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|row| row.0 * of(row)).sum::<f64>();
+        let product = |i: usize, j: usize| sum(&|row| column(row, i) * column(row, j));
+        Self {
+            sums: (0..count).map(|i| sum(&|row| column(row, i))).collect(),
+            of: (0..=count).map(|i| (0..=count).map(|j| product(i, j)).collect()).collect(),
         }
-        equations[i] = scaled;
     }
-    equations.iter().map(|equation| equation[count]).collect()
+
+    /// The coefficients of the chosen terms whose sums have the least square errors; 0 for one that is the same as those before it. The normal
+    /// equations are solved by Gauss-Jordan elimination.
+    fn least_squares(&self, chosen: &[usize]) -> Vec<f64> {
+        let columns = || chosen.iter().copied().chain([self.sums.len()]);
+        let equation = |i: &usize| columns().map(|j| self.of[*i][j]).collect();
+        let mut equations: Vec<Vec<f64>> = chosen.iter().map(equation).collect();
+        for (i, term) in chosen.iter().enumerate() {
+            let pivot = equations[i][i];
+            let is_new = pivot > INDEPENDENT * self.of[*term][*term];
+            let scale = if is_new { 1.0 / pivot } else { 0.0 };
+            let scaled: Vec<f64> = equations[i].iter().map(|entry| scale * entry).collect();
+            for equation in &mut equations {
+                let factor = equation[i];
+                equation.iter_mut().zip(&scaled).for_each(|(entry, of)| *entry -= factor * of);
+            }
+            equations[i] = scaled;
+        }
+        equations.iter().map(|equation| equation[chosen.len()]).collect()
+    }
 }
 
 #[cfg(test)]
@@ -125,7 +149,7 @@ mod tests {
                 let value: f64 = (0..4).filter(|i| *i != absent).map(|i| of[i] * row.2[i]).sum();
                 row.2.iter_mut().for_each(|term| *term /= value);
             }
-            let sum = Sum::fit(&rows, 3).unwrap();
+            let sum = Sum::fit(&rows, &[0, 1, 2, 3], 3).unwrap();
             // A term is left out only if the others predict as well.
             for (_, value, terms) in &rows {
                 prop_assert!((sum.at(terms) - value).abs() < 1e-3, "{sum:?}");
@@ -137,7 +161,7 @@ mod tests {
     fn errors_are_weighted() {
         let row = |place: f64, value: f64| (place, 1.0, vec![1.0 / value]);
         // Of 2, of 4 twice and of 4 thrice, by a constant c: (c/2 - 1)^2 + 5 (c/4 - 1)^2 is least at c = 28/9.
-        let sum = Sum::fit(&[row(1.0, 2.0), row(2.0, 4.0), row(3.0, 4.0)], 1).unwrap();
+        let sum = Sum::fit(&[row(1.0, 2.0), row(2.0, 4.0), row(3.0, 4.0)], &[0], 1).unwrap();
         assert!((sum.at(&[1.0]) - 28.0 / 9.0).abs() < 1e-12, "{sum:?}");
     }
 
@@ -145,16 +169,17 @@ mod tests {
     fn a_term_that_fits_a_disturbance_but_predicts_worse_is_left_out() {
         // Falls as 1/x but for the last values, to which a second term brings the sum nearer; of those up to 16, it predicts the one at 32 worse.
         let factors = [(1.0, 1.0), (2.0, 1.0), (4.0, 1.0), (8.0, 1.0), (16.0, 1.08), (32.0, 1.05)];
-        let sum = Sum::fit(&rows(&factors.map(|(x, factor)| [x, factor / x])), 2).unwrap();
+        let sum =
+            Sum::fit(&rows(&factors.map(|(x, factor)| [x, factor / x])), &[0, 1, 2, 3], 2).unwrap();
         assert_eq!(sum.terms.iter().map(|term| term.0).collect::<Vec<_>>(), [3]);
     }
 
     #[test]
     fn too_few_values_and_differences_are_no_sum() {
-        assert_eq!(Sum::fit(&rows(&[[1.0, 1.0], [2.0, 2.0], [2.0, 2.0]]), 2), None);
+        assert_eq!(Sum::fit(&rows(&[[1.0, 1.0], [2.0, 2.0], [2.0, 2.0]]), &[0, 1, 2, 3], 2), None);
         // Nothing falls from 9 by 1 with these terms but a sum with 1/x; none is subtracted.
         let rows = rows(&[[1.0, 9.0], [2.0, 8.0], [3.0, 7.0], [4.0, 6.0]]);
-        let sum = Sum::fit(&rows, 2).unwrap();
+        let sum = Sum::fit(&rows, &[0, 1, 2, 3], 2).unwrap();
         assert!(sum.terms.iter().all(|(_, coefficient)| *coefficient > 0.0), "{sum:?}");
     }
 
@@ -162,12 +187,12 @@ mod tests {
     fn a_sum_of_all_terms_has_none_that_is_subtracted() {
         // 3 + 2x, but for 0.5/x that is missing at one end.
         let rows = rows(&[[1.0, 4.5], [2.0, 7.0], [4.0, 11.0], [8.0, 19.0], [16.0, 35.0]]);
-        let sum = Sum::fit(&rows, 4).unwrap();
+        let sum = Sum::fit(&rows, &[0, 1, 2, 3], 4).unwrap();
         assert!(sum.terms.iter().all(|(_, coefficient)| *coefficient > 0.0), "{sum:?}");
         assert!(rows.iter().all(|row| (sum.at(&row.2) - 1.0).abs() < 0.1), "{sum:?}");
-        let exact = Sum::fit(&rows[1..], 4).unwrap();
+        let exact = Sum::fit(&rows[1..], &[0, 1, 2, 3], 4).unwrap();
         assert!(exact.terms.iter().all(|(i, of)| (of - [3.0, 2.0, 0.0, 0.0][*i]).abs() < 1e-6));
-        assert_eq!(Sum::fit(&[], 4), None);
+        assert_eq!(Sum::fit(&[], &[], 4), None);
     }
 
     #[test]
@@ -183,7 +208,7 @@ mod tests {
     fn a_term_that_is_the_same_as_another_one_has_no_coefficient() {
         let rows = [[1.0, 5.0], [2.0, 7.0], [4.0, 11.0]];
         let rows = rows.map(|[x, value]: [f64; 2]| (x, value, vec![1.0, x, 3.0 - x]));
-        let found = least_squares(&rows);
+        let found = Products::of(&rows).least_squares(&[0, 1, 2]);
         assert!((found[0] - 3.0).abs() + (found[1] - 2.0).abs() < 1e-9, "{found:?}");
         assert_eq!(found[2], 0.0);
     }

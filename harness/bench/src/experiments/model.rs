@@ -1,11 +1,13 @@
 //! Models of a program's phases on simulated ranks, to predict what was not measured.
 //!
-//! A counter is exact, so it comes first: its mean over the ranks is a [`Sum`] of [`TERMS`], functions of cells N, ranks p and facets F, with
-//! coefficients of its geometry. The mean time of a phase is then a sum of costs times means of counters. These costs are of the program and the
-//! machine, so runs around all geometries are fitted together: facets, cells and ranks vary independently of each other only there. The excess
-//! of a maximum over its mean x is (a x + b √x + c) ln p: ranks differ in proportion to their work, by chance, and by what hits one of them, and
-//! the greatest of p values with an exponential tail lies ln p above. A phase takes as long as on its slowest rank, plus its messages in the
-//! latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
+//! A counter is exact, so it comes first: its mean over the ranks is a [`Sum`] of [`TERMS`], functions of cells N, ranks p and facets F. What
+//! depends on the geometry has coefficients of that geometry, and what collective operations send has those of the program, as it is the same
+//! around all geometries: so counters around all of them are fitted together. The mean time of a phase is then a sum of costs times means of
+//! counters. These costs are of the program and the machine, and fitted together as well: facets, cells and ranks vary independently of each
+//! other only there. The excess of a maximum over its mean is (a x + b √x + c) ln p + d x√p, where x is the part of the mean that differs from
+//! rank to rank: ranks differ in proportion to their work, by chance, and by what hits one of them, and the greatest of p values with an
+//! exponential tail lies ln p above; and a counter may be that of a place which is not divided in proportion to the ranks. A phase takes as long
+//! as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
 //!
 //! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same quantity in
 //! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, each divided by
@@ -37,17 +39,20 @@ pub struct At {
     pub facets: f64,
 }
 
-/// The terms of the excess of a maximum over a mean.
-fn excesses(mean: f64, ranks: f64) -> [f64; 3] {
-    [mean, mean.sqrt(), 1.0].map(|term| term * ranks.ln())
+/// The terms of the excess of a maximum over a mean, for the part x of the mean that differs from rank to rank.
+fn excesses(x: f64, ranks: f64) -> [f64; 4] {
+    [x * ranks.ln(), x.sqrt() * ranks.ln(), ranks.ln(), x * ranks.sqrt()]
 }
 
+/// Their names.
+const EXCESSES: [&str; 4] = ["x ln p", "√x ln p", "ln p", "x√p"];
+
 /// A function of a run, with its name.
-type Term = (&'static str, fn(&At) -> f64);
+type Function = (&'static str, fn(&At) -> f64);
 
 /// The terms of a mean over the ranks: parts of cells and of facets, the cells along the facets of a part, the boundary of a
 /// part of a surface, a constant, reduction by a tree and by groups, and what an allgather sends of a fixed size per rank and of one in total.
-const TERMS: [Term; 9] = [
+const TERMS: [Function; 9] = [
     ("N/p", |at| at.cells / at.ranks),
     ("F/p", |at| at.facets / at.ranks),
     ("√(NF)/p", |at| (at.cells * at.facets).sqrt() / at.ranks),
@@ -59,11 +64,17 @@ const TERMS: [Term; 9] = [
     ("(1 – 1/p)", |at| 1.0 - 1.0 / at.ranks),
 ];
 
-/// Terms of times beside counters.
-const OTHER_CAUSES: [Term; 3] = [TERMS[1], TERMS[4], TERMS[6]];
+/// So many of them, the first ones, depend on the geometry and differ from rank to rank: each geometry has coefficients of its own. What the
+/// others count is the same on all ranks, and around all geometries.
+const GEOMETRIC: usize = 4;
 
-/// The most terms of a counter, which is exact, and of a time, which is not: predictions among its runs cannot distinguish terms.
-const TERMS_MAX: [usize; 2] = [3, usize::MAX];
+/// Terms of times beside counters.
+const OTHER_CAUSES: [Function; 3] = [TERMS[1], TERMS[4], TERMS[6]];
+
+/// The most kinds of terms of a counter, which is exact, and of a time, which is not: predictions among its runs cannot distinguish terms.
+const KINDS_MAX: [usize; 2] = [3, usize::MAX];
+/// How many of the first [`EXCESSES`] a counter and a time may have: the last one is not distinguished from noise.
+const EXCESS_KINDS: [usize; 2] = [4, 3];
 /// Counters are of runs on more ranks than these, or than the most ranks over them: few ranks communicate in other ways, such as without groups.
 const FEW: f64 = 8.0;
 
@@ -85,13 +96,27 @@ pub type Key = (Kind, String);
 pub type Ends = [f64; 2];
 
 type Quantities = BTreeMap<Key, Ends>;
-/// Terms with their names.
-type Terms<'a> = Vec<(&'a str, f64)>;
+
+/// A term of a mean, for a run.
+struct Term<'a> {
+    name: &'a str,
+    value: f64,
+    /// Terms of one kind are chosen together.
+    kind: usize,
+    /// Whether it is the same on all ranks.
+    is_even: bool,
+}
+
+type Terms<'a> = Vec<Term<'a>>;
+
+fn values(terms: &Terms) -> Vec<f64> {
+    terms.iter().map(|term| term.value).collect()
+}
 
 /// What is known of a run.
 struct Sample {
-    /// Whether its geometry is the one of the model.
-    is_own: bool,
+    /// Number of its geometry, 0 for that of the model.
+    geometry: usize,
     at: At,
     of: Quantities,
     network: Network,
@@ -110,7 +135,7 @@ fn run_time() -> Key {
 }
 
 impl Sample {
-    fn of(group: &Group, case: &str) -> Self {
+    fn of(group: &Group, geometries: &[&str]) -> Self {
         let (run, ranks) = (&group.typical, group.setup.ranks as f64);
         let at = At { cells: run.cells as f64, ranks, facets: run.facets as f64 };
         let ends = |of: &Spread| [of.sum / ranks, of.max];
@@ -122,11 +147,13 @@ impl Sample {
             of.extend(traffic(&phase.name).into_iter().zip(messages));
             of.insert((Kind::Phase, phase.name.clone()), ends(&phase.useful_s));
         }
-        // What happens less than once on a rank explains no time. The phases' messages are counted apart.
-        let is_sum = |name: &str| ["messages", "message_bytes"].contains(&name);
-        of.retain(|(kind, name), [mean, _]| *kind == Kind::Phase || *mean >= 1.0 && !is_sum(name));
+        // What happens less than once on a rank explains no time, and a greatest value counts nothing. The phases' messages are counted apart.
+        let is_none =
+            |name: &str| ["messages", "message_bytes"].contains(&name) || name.ends_with("_max");
+        of.retain(|(kind, name), [mean, _]| *kind == Kind::Phase || *mean >= 1.0 && !is_none(name));
         of.insert(run_time(), [group.time_s.value; 2]);
-        Self { is_own: group.setup.case == case, at, of, network: group.network }
+        let geometry = geometries.iter().position(|case| *case == group.setup.case);
+        Self { geometry: geometry.expect("a known one"), at, of, network: group.network }
     }
 }
 
@@ -140,84 +167,120 @@ struct Law {
 }
 
 impl Law {
-    /// Of the runs that have this quantity, with all terms of each and their names; `None` if they are too few.
+    /// Of the runs that have this quantity, with all terms of each; `None` if they are too few. A counter's excess is that around its geometry.
     fn fit<'a>(samples: &[&Sample], key: &Key, of: impl Fn(&Sample) -> Terms<'a>) -> Option<Self> {
-        let known = samples.iter().filter_map(|s| Some((*s, *s.of.get(key)?)));
-        let known: Vec<_> = known.filter(|(_, [mean, _])| *mean > 0.0).collect();
-        let row = |(s, [mean, _]): &(&Sample, Ends)| -> Row {
-            (s.at.ranks, 1.0, of(s).iter().map(|term| term.1 / mean).collect())
+        let known = samples.iter().filter_map(|s| Some((*s, *s.of.get(key)?, of(s))));
+        let known: Vec<_> = known.filter(|(_, [mean, _], _)| *mean > 0.0).collect();
+        let own = &known.iter().find(|known| known.0.geometry == 0)?.2;
+        let kinds: Vec<usize> = own.iter().map(|term| term.kind).collect();
+        let [most, excess_kinds] = [KINDS_MAX, EXCESS_KINDS].map(|of| of[key.0 as usize]);
+        let row = |(s, [mean, _], terms): &(&Sample, Ends, Terms)| -> Row {
+            (s.at.ranks, 1.0, terms.iter().map(|term| term.value / mean).collect())
         };
-        let means: Vec<Row> = known.iter().map(row).collect();
-        let mean = Sum::fit(&means, TERMS_MAX[key.0 as usize])?;
-        let row = |(s, [mean, max]): &(&Sample, Ends)| -> Row {
-            let terms = excesses(*mean, s.at.ranks).map(|term| term / max);
-            (s.at.ranks, 1.0 - mean / max, terms.to_vec())
+        let mean = Sum::fit(&known.iter().map(row).collect::<Vec<Row>>(), &kinds, most)?;
+        let row = |(s, [measured, max], terms): &(&Sample, Ends, Terms)| -> Row {
+            let fitted = mean.at(&values(terms)).max(f64::MIN_POSITIVE);
+            let all = excesses(measured * uneven(&mean, terms) / fitted, s.at.ranks);
+            let relative = all.map(|term| term / max);
+            (s.at.ranks, 1.0 - measured / max, relative[..excess_kinds].to_vec())
         };
-        let excess = Sum::fit(&known.iter().map(row).collect::<Vec<Row>>(), usize::MAX)?;
-        let formula = |sum: &Sum, names: &[&str]| {
-            let term = |(term, of): &(usize, f64)| format!("{of:.1e} {}", names[*term]);
-            sum.terms.iter().map(|of| term(of).trim().to_owned()).collect::<Vec<_>>().join(" + ")
-        };
-        let names: Vec<&str> = of(known[0].0).iter().map(|term| term.0).collect();
-        let formulas = [formula(&mean, &names), formula(&excess, &["x ln p", "√x ln p", "ln p"])];
+        let is_fitted = |s: &Sample| key.0 == Kind::Phase || s.geometry == 0;
+        let rows: Vec<Row> = known.iter().filter(|known| is_fitted(known.0)).map(row).collect();
+        let excess = Sum::fit(&rows, &[0, 1, 2, 3][..excess_kinds], most)?;
+        let names: Vec<&str> = own.iter().map(|term| term.name).collect();
+        let is_own = |(term, _): &&(usize, f64)| own[*term].value > 0.0;
+        let of_own: Vec<_> = mean.terms.iter().filter(is_own).copied().collect();
+        let formulas = [formula(&of_own, &names), formula(&excess.terms, &EXCESSES)];
         Some(Self { mean, excess, formulas })
     }
 
     /// Mean and maximum for the values of all terms.
     fn at(&self, terms: &Terms, at: &At) -> Ends {
-        let mean = self.mean.at(&terms.iter().map(|term| term.1).collect::<Vec<f64>>());
-        [mean, (mean + self.excess.at(&excesses(mean, at.ranks))).min(mean * at.ranks)]
+        let mean = self.mean.at(&values(terms));
+        let excess = self.excess.at(&excesses(uneven(&self.mean, terms), at.ranks));
+        [mean, (mean + excess).min(mean * at.ranks)]
     }
+}
+
+/// A sum of terms with their names.
+fn formula(terms: &[(usize, f64)], names: &[&str]) -> String {
+    let term = |(term, of): &(usize, f64)| format!("{of:.1e} {}", names[*term]);
+    terms.iter().map(|of| term(of).trim().to_owned()).collect::<Vec<_>>().join(" + ")
+}
+
+/// The part of a mean that differs from rank to rank.
+fn uneven(mean: &Sum, terms: &Terms) -> f64 {
+    let value = |term: &Term| if term.is_even { 0.0 } else { term.value };
+    mean.at(&terms.iter().map(value).collect::<Vec<f64>>())
 }
 
 /// A model of the runs of one program around one geometry with one n.
 struct Model {
     /// The most cells and ranks that were fitted.
     most: At,
+    /// Number of geometries of the runs that were fitted.
+    geometries: usize,
     /// Of counters, then of phases in the program's order.
     laws: Vec<(Key, Law)>,
 }
 
-/// The terms of a law with their names: of a counter [`TERMS`]; of the time of a phase the means of the program's counters and of its own
-/// messages, facets per rank, a constant, and work for each group of ranks.
-fn terms<'a>(laws: &'a [(Key, Law)], (kind, name): &Key, at: &At, of: &Quantities) -> Terms<'a> {
+/// The terms of a law around one of several geometries: of a counter [`TERMS`], the geometric ones once for each; of the time of a phase the means of
+/// the program's counters and of its own messages, facets per rank, a constant, and work for each group of ranks.
+fn terms<'a>(
+    laws: &'a [(Key, Law)],
+    (kind, name): &Key,
+    (geometry, geometries): (usize, usize),
+    at: &At,
+    of: &Quantities,
+) -> Terms<'a> {
     if *kind == Kind::Counter {
-        return TERMS.iter().map(|(name, term)| (*name, term(at))).collect();
+        let geometric =
+            (0..geometries).flat_map(|of| (0..GEOMETRIC).map(move |i| (i, of == geometry)));
+        let common = (GEOMETRIC..TERMS.len()).map(|i| (i, true));
+        let term = |(kind, is_in): (usize, bool)| {
+            let (name, of) = TERMS[kind];
+            let value = if is_in { of(at) } else { 0.0 };
+            Term { name, value, kind, is_even: kind >= GEOMETRIC }
+        };
+        return geometric.chain(common).map(term).collect();
     }
     let [own, _] = traffic(name);
     let is_traffic = |key: &Key| TRAFFIC.iter().any(|what| key.1.starts_with(what));
     let is_cause = |key: &&Key| key.0 == Kind::Counter && (!is_traffic(key) || **key == own);
     let causes = laws.iter().map(|law| &law.0).filter(is_cause);
     let means = causes.map(|key| (key.1.as_str(), of.get(key).map_or(0.0, |ends| ends[0])));
-    means.chain(OTHER_CAUSES.map(|(name, term)| (name, term(at)))).collect()
+    let all = means.chain(OTHER_CAUSES.map(|(name, term)| (name, term(at))));
+    let term = |(kind, (name, value))| Term { name, value, kind, is_even: false };
+    all.enumerate().map(term).collect()
 }
 
 impl Model {
     /// Fits runs, the last own one of which is on the most ranks; without those on three numbers of ranks, nothing has a law.
     fn fit(samples: &[Sample], phases: &[Phase]) -> Option<Self> {
-        let own = || samples.iter().filter(|sample| sample.is_own);
+        let own = || samples.iter().filter(|sample| sample.geometry == 0);
         let cells = own().map(|sample| sample.at.cells).fold(0.0, f64::max);
         let most = At { cells, ..own().next_back()?.at };
         let is_counter =
             |key: &&Key| key.0 == Kind::Counter && own().all(|s| s.of.contains_key(key));
         let counters = own().next()?.of.keys().filter(is_counter).cloned();
         let phases = phases.iter().map(|phase| (Kind::Phase, phase.name.clone()));
+        let geometries = samples.iter().map(|s| s.geometry + 1).max()?;
         let mut laws = Vec::new();
         for key in counters.chain(phases) {
-            let is_many = |s: &&Sample| s.is_own && s.at.ranks > FEW.min(most.ranks / FEW);
+            let is_many = |s: &&Sample| s.at.ranks > FEW.min(most.ranks / FEW);
             let fitted = samples.iter().filter(|s| key.0 == Kind::Phase || is_many(s));
-            let law =
-                Law::fit(&fitted.collect::<Vec<_>>(), &key, |s| terms(&laws, &key, &s.at, &s.of));
+            let of = |s: &Sample| terms(&laws, &key, (s.geometry, geometries), &s.at, &s.of);
+            let law = Law::fit(&fitted.collect::<Vec<_>>(), &key, of);
             laws.extend(law.map(|law| (key, law)));
         }
-        Some(Self { most, laws })
+        Some(Self { most, geometries, laws })
     }
 
     /// All quantities, and the time of a run.
     fn predict(&self, at: &At, network: &Network) -> Quantities {
         let (mut all, mut run_s) = (BTreeMap::new(), 0.0);
         for (key, law) in &self.laws {
-            let ends = law.at(&terms(&self.laws, key, at, &all), at);
+            let ends = law.at(&terms(&self.laws, key, (0, self.geometries), at, &all), at);
             if key.0 == Kind::Phase {
                 let most = |key: Key| all.get(&key).map_or(0.0, |of: &Ends| of[1]);
                 let [messages, bytes] = traffic(&key.1).map(most);
@@ -245,7 +308,7 @@ impl Model {
             let (at, measured) = (sample.at, *sample.of.get(&key)?);
             let ratio = predicted[1] / measured[1];
             let error = (ratio.max(1.0 / ratio) - 1.0) / reach;
-            let is_compared = sample.is_own && predicted[1].min(measured[1]) > 0.0;
+            let is_compared = sample.geometry == 0 && predicted[1].min(measured[1]) > 0.0;
             is_compared.then_some(Compared { key, at, predicted, measured, reach, error })
         };
         self.reaching(&sample.at, &sample.network).into_iter().filter_map(compared).collect()
@@ -297,8 +360,10 @@ impl Tested {
         let mut groups = groups.to_vec();
         groups.sort_by_key(|group| (group.setup.ranks, group.cells()));
         let phases = &groups.iter().rfind(|group| group.setup.case == case)?.typical.phases;
-        let samples: Vec<Sample> = groups.iter().map(|group| Sample::of(group, case)).collect();
-        let own = distinct(samples.iter().filter(|s| s.is_own).map(|s| s.at.ranks));
+        let others = groups.iter().map(|group| &*group.setup.case).filter(|other| *other != case);
+        let geometries = distinct([case].into_iter().chain(others));
+        let samples: Vec<Sample> = groups.iter().map(|g| Sample::of(g, &geometries)).collect();
+        let own = distinct(samples.iter().filter(|s| s.geometry == 0).map(|s| s.at.ranks));
         let most = share * own.last()?;
         let up_to = |ranks: f64| &samples[..samples.partition_point(|s| s.at.ranks <= ranks)];
         let fitted = *own.iter().rfind(|ranks| **ranks <= most)?;
@@ -381,7 +446,9 @@ mod tests {
         let mut run = run(Comm::Sim, cells, &[("work", &times)]);
         run.setup.case = case.to_owned();
         run.setup.spacing_min = 1.0 / cells as f64;
-        run.counters.insert("work".into(), Spread::brief(&vec![work; ranks]));
+        for name in ["work", "leaf_max"] {
+            run.counters.insert(name.into(), Spread::brief(&vec![work; ranks]));
+        }
         run.phases[0].messages = Spread::brief(&vec![messages; ranks]);
         run
     }
@@ -418,6 +485,30 @@ mod tests {
             assert_eq!(of(Kind::Counter, "messages of work")[0], "3.0e0 ⌈log₂p⌉");
             assert!(of(Kind::Phase, "work")[1].starts_with("1.0e-1 x ln p"), "{formulas:?}");
         }
+    }
+
+    #[test]
+    fn what_all_ranks_send_around_all_geometries_is_found_apart_and_has_no_excess() {
+        let key: Key = (Kind::Counter, "bytes".to_owned());
+        let sample = |geometry: usize, cells: f64, ranks: f64| {
+            let part = [0.3, 0.1][geometry] * cells / ranks;
+            let mean = part + 80.0 * (ranks - 1.0);
+            let at = At { cells, ranks, facets: 12.0 };
+            let of = [(key.clone(), [mean, mean + 0.1 * part * ranks.ln()])].into();
+            Sample { geometry, at, of, network: ASSUMED }
+        };
+        // Around the first geometry alone what is sent is less than a hundredth.
+        let runs = [16.0, 24.0, 32.0, 48.0, 64.0];
+        let first = runs.map(|ranks| sample(0, 1e8, ranks));
+        let second = runs.map(|ranks| sample(1, 1e6, ranks));
+        let samples: Vec<&Sample> = first.iter().chain(&second).collect();
+        let of = |s: &Sample| terms(&[], &key, (s.geometry, 2), &s.at, &s.of);
+        let law = Law::fit(&samples, &key, of).unwrap();
+        assert_eq!(law.formulas, ["3.0e-1 N/p + 8.0e1 (p – 1)", "1.0e-1 x ln p"]);
+        let far = sample(0, 1e8, 1024.0);
+        let [mean, max] = law.at(&of(&far), &far.at);
+        let off = [mean / far.of[&key][0], max / far.of[&key][1]].map(|ratio| (ratio - 1.0).abs());
+        assert!(off[0].max(off[1]) < 1e-6, "{off:?}");
     }
 
     #[test]
@@ -460,14 +551,14 @@ mod tests {
     #[test]
     fn a_time_that_is_too_short_to_be_kept_but_on_few_ranks_has_no_law() {
         let sample = |ranks: f64, mean: f64| Sample {
-            is_own: true,
+            geometry: 0,
             at: At { cells: 1e9, ranks, facets: 12.0 },
             of: [((Kind::Phase, "a".to_owned()), [mean; 2])].into(),
             network: ASSUMED,
         };
         let fit = |samples: &[Sample]| {
             Law::fit(&samples.iter().collect::<Vec<_>>(), &(Kind::Phase, "a".to_owned()), |_| {
-                vec![("", 1.0)]
+                vec![Term { name: "", value: 1.0, kind: 0, is_even: false }]
             })
         };
         assert!(

@@ -129,17 +129,18 @@ fn far((subject, of, all, _): &Modelled) -> Option<String> {
 /// All quantities of all runs that were modelled, one per line.
 pub fn csv(groups: &Groups) -> String {
     let mut out =
-        "model,kind,quantity,cells,ranks,held out,predicted,low,high,measured\n".to_owned();
+        "model,kind,quantity,cells,ranks,held out,predicted,low,high,measured,predicted mean,measured mean\n".to_owned();
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     for (subject, of, _, model) in models(groups) {
         let of = quoted(&described(subject, &of));
         for c in &model.compared {
             let (At { cells, ranks, .. }, kind, name) = (c.at, c.key.0, quoted(&c.key.1));
-            let ([_, predicted], [_, measured], width) = (c.predicted, c.measured, model.width(c));
+            let ([mean, predicted], [of_mean, measured]) = (c.predicted, c.measured);
+            let width = model.width(c);
             let (low, high) = (predicted / width, predicted * width);
             let held_out = if ranks > model.fitted { "yes" } else { "no" };
             out += &format!(
-                "{of},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e}\n"
+                "{of},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e},{mean:e},{of_mean:e}\n"
             );
         }
     }
