@@ -166,8 +166,10 @@ impl MeshArguments {
     pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>), Failure> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
-            let why = format!("{} is meshed already: omit --engine", self.mesh);
-            Failure::unless(self.engine.engine == "mesher", why)?;
+            let EngineArguments { engine, programs } = &self.engine;
+            let is_given = programs.mesher.is_some() || programs.reference.is_some();
+            let why = format!("{} is meshed already: omit the programs", self.mesh);
+            Failure::unless(engine == "mesher" && !is_given, why)?;
             let case = self.case.as_deref().map(Case::read).transpose()?;
             return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }

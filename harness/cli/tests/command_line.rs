@@ -164,6 +164,7 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["bench", "--show", "--network", "1e-6,1e9"], "cannot be used with"),
         (&["shrink", file, "--test-only", "--out", "x"], "cannot be used with"),
         (&["why", place.path().to_str().unwrap(), "0,0,0", "--engine", "x"], "is meshed already"),
+        (&["why", place.path().to_str().unwrap(), "0,0,0", "--mesher", file], "is meshed already"),
     ] {
         let output = harness(arguments);
         let message = String::from_utf8(output.stderr).unwrap();

@@ -53,7 +53,10 @@ impl Fixture {
     /// Exit code, and standard output and error, of `harness picture`.
     fn picture(&self, arguments: &str) -> (i32, String) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.arg("picture").args(arguments.split(' ')).args(["--mesher", "mesher"]);
+        command.arg("picture").args(arguments.split(' '));
+        if !arguments.starts_with("mesh ") {
+            command.args(["--mesher", "mesher"]);
+        }
         let output = command.current_dir(self.0.path()).output().unwrap();
         let text = [output.stdout, output.stderr].concat();
         (output.status.code().unwrap(), String::from_utf8(text).unwrap())
