@@ -26,20 +26,16 @@ const RANKS: RangeInclusive<usize> = 1..=65_536;
 /// The [`Setup::experiment`] of runs for targets.
 pub const EXPERIMENT: &str = "targets";
 /// A study file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Study {
     /// Meshes by name.
-    #[serde(default)]
     pub mesh: BTreeMap<String, Mesh>,
     /// Runs by name.
-    #[serde(default)]
     pub run: BTreeMap<String, RunSpec>,
     /// The rows, in order.
-    #[serde(default)]
     pub row: Vec<Row>,
     /// The series, in order.
-    #[serde(default)]
     pub series: Vec<Series>,
     /// Directory of the file; paths are relative to it.
     #[serde(skip)]
@@ -171,7 +167,6 @@ pub struct Series {
     #[serde(default)]
     pub cells: Vec<f64>,
     /// Facets per rank (weak), which the case's generator makes; if missing, the facets of the case.
-    #[serde(default)]
     pub facets: Option<usize>,
     /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files, whose paths in the file are relative to
     /// it.
