@@ -12,7 +12,7 @@ use contract::plain::{PlainCase, StlForm};
 use export::polydata;
 use geometry::leak::report::{Answers, Passage};
 use geometry::leak::{Leaks, Target};
-use report::json::pretty;
+use report::pretty;
 use run::engine::layout::SERIAL;
 use run::engine::runner::{Given, Programs};
 use run::progress::Progress;
