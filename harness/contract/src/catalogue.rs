@@ -1,6 +1,7 @@
 //! The catalogue of cases (`geometries/catalogue.toml`): cases by name, by size, or by the path of a case file.
 
 use crate::files;
+use crate::number::numbered;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
@@ -73,13 +74,8 @@ impl Catalogue {
                 false => self.named(argument)?,
             };
             // A directory of results has the name of its case, so names must be unique.
-            if selected.iter().any(|other| other.name == case.name) {
-                let is_free = |name: &String| selected.iter().all(|other| other.name != *name);
-                case.name = (2..)
-                    .map(|n| format!("{}-{n}", case.name))
-                    .find(is_free)
-                    .expect("a number is free");
-            }
+            let is_free = |name: &String| selected.iter().all(|other| other.name != *name);
+            case.name = numbered(&case.name, '-', is_free);
             selected.push(case);
         }
         Ok(selected)

@@ -113,6 +113,14 @@ pub trait Watch: Sync {
 
     /// Whether the user has interrupted it.
     fn is_interrupted(&self) -> bool;
+
+    /// Whether to continue.
+    ///
+    /// # Errors
+    /// If the user has interrupted it.
+    fn check(&self) -> Result<(), Failure> {
+        if self.is_interrupted() { Err(Failure::interrupted()) } else { Ok(()) }
+    }
 }
 
 #[cfg(test)]

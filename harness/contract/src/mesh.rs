@@ -52,6 +52,8 @@ pub struct Leaf {
 /// Visits leaves of the part with an index.
 pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Block]) -> Result<(), Failure>;
 
+/// Visits a leaf; its error ends the traversal.
+pub type Each<'a> = &'a mut dyn FnMut(Leaf) -> Result<(), Failure>;
 /// Asks whether to continue; its error ends a visit.
 pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
 
@@ -146,7 +148,7 @@ impl Mesh {
         &self,
         check: Check<'_>,
         takes: &dyn Fn(&Octant) -> bool,
-        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
+        visit: Each<'_>,
     ) -> Result<(), Failure> {
         let (mut index, mut digest) = (0u64, Digest::default());
         self.visit(&mut |part, blocks| {

@@ -1,5 +1,7 @@
 //! Numbers for readers, and from files of the kernel.
 
+use std::iter;
+
 /// A length with three significant digits.
 pub fn number(x: f64) -> String {
     let is_short = x == 0.0 || (1e-4..1e6).contains(&x.abs());
@@ -16,6 +18,13 @@ pub fn digits(value: f64) -> String {
 /// A number with thousands separators.
 pub fn grouped(n: u64) -> String {
     if n < 1000 { n.to_string() } else { format!("{},{:03}", grouped(n / 1000), n % 1000) }
+}
+
+/// This name, or else the first that is free with a number after it, from 2 on.
+pub fn numbered(name: &str, separator: char, is_free: impl FnMut(&String) -> bool) -> String {
+    let numbered = (2..).map(|number| format!("{name}{separator}{number}"));
+    let mut names = iter::once(name.to_owned()).chain(numbered);
+    names.find(is_free).expect("numbers do not end")
 }
 
 /// A duration in seconds up to two minutes, and in minutes beyond, rounded up.

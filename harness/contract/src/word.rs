@@ -107,15 +107,13 @@ pub fn check(word: u64) -> Result<(), String> {
 
 fn violation(word: u64) -> Option<String> {
     let level = level(word);
-    if level > LEVEL_MAX {
-        Some(format!("level {level} is deeper than {LEVEL_MAX}"))
-    } else if word & 3 == 3 {
-        Some("side 3 does not exist".to_owned())
-    } else if key(word) & (span(level) - 1) != 0 {
-        Some("the corner is not a multiple of the leaf's edge".to_owned())
-    } else {
-        None
-    }
+    let why = match () {
+        () if level > LEVEL_MAX => format!("level {level} is deeper than {LEVEL_MAX}"),
+        () if word & 3 == 3 => "side 3 does not exist".to_owned(),
+        () if key(word) & (span(level) - 1) == 0 => return None,
+        () => "the corner is not a multiple of the leaf's edge".to_owned(),
+    };
+    Some(why)
 }
 
 /// The end of the leaves so far, as a Morton code.

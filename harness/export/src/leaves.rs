@@ -20,6 +20,9 @@ use contract::word;
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
 
+/// Visits a cell with its number, its octant and its squares; its error ends the walk.
+pub type Visit<'a> = &'a mut dyn FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>;
+
 /// The leaves.
 pub struct Leaves {
     words: Vec<u64>,
@@ -133,11 +136,7 @@ impl Leaves {
     ///
     /// # Errors
     /// The first error of `visit`, or the user's interrupt.
-    pub fn walk(
-        &self,
-        options: &Options,
-        visit: &mut impl FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    pub fn walk(&self, options: &Options, visit: Visit) -> Result<(), Failure> {
         let content = self.content(0, self.words.len(), 0);
         let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
         self.descend(&root, &mut Vec::new(), options, visit)
@@ -148,7 +147,7 @@ impl Leaves {
         around: &Around,
         squares: &mut Vec<Square>,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>,
+        visit: Visit,
     ) -> Result<(), Failure> {
         if let Content::Cell(number) = around.content {
             options.check_at(u64::from(number))?;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use contract::case::Case;
 use contract::failure::{Failure, Watch};
-use contract::mesh::{Leaf, Mesh};
+use contract::mesh::{Each, Mesh};
 use contract::octant::Octant;
 use contract::word::{self, KEY_END};
 
@@ -29,10 +29,7 @@ pub struct Export<'a> {
 
 impl Export<'_> {
     /// Visits the selected leaves in Morton order. All leaves are read once.
-    pub(crate) fn visit(
-        &self,
-        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    pub(crate) fn visit(&self, visit: Each<'_>) -> Result<(), Failure> {
         self.selection.visit(self.mesh, &|| self.options.check(), visit)
     }
 
@@ -103,7 +100,7 @@ impl Options<'_> {
     /// # Errors
     /// If the user has interrupted the export.
     pub fn check(&self) -> Result<(), Failure> {
-        if self.watch.is_interrupted() { Err(Failure::interrupted()) } else { Ok(()) }
+        self.watch.check()
     }
 
     /// The same in a loop of fast steps, of which `count` are done. Most calls do not ask.

@@ -82,29 +82,22 @@ fn quadrants(
             )));
         }
         let key = word::key_of(octant.corner);
-        fill(next, key, &mut |octant| visit(octant, FILLER))?;
+        fill(next, key).try_for_each(|octant| visit(octant, FILLER))?;
         next = key + word::span(octant.level);
         visit(octant, if has_sides { side as u8 } else { NO_SIDE })
     })?;
-    fill(next, KEY_END, &mut |octant| visit(octant, FILLER))
+    fill(next, KEY_END).try_for_each(|octant| visit(octant, FILLER))
 }
 
-/// Visits the fewest octants that cover the Morton codes from `key` to `end`, in order.
-fn fill(
-    mut key: u64,
-    end: u64,
-    visit: &mut impl FnMut(Octant) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    while key < end {
-        let fits = |level: &u8| {
-            let span = word::span(*level);
-            key & (span - 1) == 0 && span <= end - key
-        };
-        let level = (0..=LEVEL_MAX).find(fits).expect("a cell of the deepest level always fits");
-        visit(Octant { corner: word::corner_of(key), level })?;
+/// The fewest octants that cover the Morton codes from `key` to `end`, in order.
+fn fill(mut key: u64, end: u64) -> impl Iterator<Item = Octant> {
+    std::iter::from_fn(move || {
+        let fits = |level: &u8| key & (word::span(*level) - 1) == 0;
+        let level = (0..=LEVEL_MAX).find(|level| fits(level) && word::span(*level) <= end - key)?;
+        let octant = Octant { corner: word::corner_of(key), level };
         key += word::span(level);
-    }
-    Ok(())
+        Some(octant)
+    })
 }
 
 /// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their
@@ -263,12 +256,7 @@ mod tests {
         let unit = word::span(17);
         for begin in 0..64 {
             for end in begin..=64 {
-                let mut octants = Vec::new();
-                fill(begin * unit, end * unit, &mut |octant| {
-                    octants.push(octant);
-                    Ok(())
-                })
-                .unwrap();
+                let octants: Vec<Octant> = fill(begin * unit, end * unit).collect();
                 let mut next = begin * unit;
                 for octant in &octants {
                     assert_eq!(word::key_of(octant.corner), next);

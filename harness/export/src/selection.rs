@@ -2,7 +2,7 @@
 
 use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
-use contract::mesh::{Check, Leaf, Mesh};
+use contract::mesh::{Check, Each, Leaf, Mesh};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word::Side;
 
@@ -71,12 +71,7 @@ impl Selection {
     ///
     /// # Errors
     /// As [`Mesh::leaves`].
-    pub fn visit(
-        &self,
-        mesh: &Mesh,
-        check: Check<'_>,
-        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    pub fn visit(&self, mesh: &Mesh, check: Check<'_>, visit: Each<'_>) -> Result<(), Failure> {
         let mut selected = |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) };
         mesh.leaves(check, &|octant| self.meets(octant), &mut selected)
     }

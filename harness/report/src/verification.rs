@@ -132,7 +132,7 @@ fn outcomes(case: &CaseReport, report: &Report) -> Vec<String> {
 /// # Panics
 /// If a reader would not find the same outcomes in it.
 pub fn json(report: &Report) -> String {
-    let text = crate::json::pretty(report);
+    let text = crate::pretty(report);
     check_json(&text, report);
     text
 }

@@ -197,9 +197,9 @@ pub(crate) fn clear(place: &Path, mesh: &Path) -> std::io::Result<()> {
 /// The path that a command writes: `{out}` and what follows it there, such as an extension.
 fn path_in(command: &Command, out: &Path) -> PathBuf {
     let out = out.to_string_lossy();
-    let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
-    let rest = words.filter_map(|word| Some(word.split_once(&*out)?.1.to_owned())).next();
-    let rest = rest.unwrap_or_default();
+    let mut words = command.get_args().map(|word| word.to_string_lossy().into_owned());
+    let rest =
+        words.find_map(|word| Some(word.split_once(&*out)?.1.to_owned())).unwrap_or_default();
     PathBuf::from(format!("{out}{}", rest.split(ENDS).next().unwrap_or_default()))
 }
 

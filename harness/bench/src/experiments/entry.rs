@@ -43,10 +43,7 @@ impl Line {
     /// Whether the numbers are those that a run can have. All tables and figures take them as such.
     pub fn is_possible(&self) -> bool {
         match &self.entry {
-            // Of an empty message, and of one more byte.
-            Entry::Network(network) => {
-                are_times([network.latency_s, 1.0 / network.bandwidth_bytes_per_s])
-            }
+            Entry::Network(network) => network.is_possible(),
             Entry::Run(run) => run.is_possible(),
             _ => true,
         }
@@ -142,6 +139,12 @@ pub const ASSUMED: Network =
     Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
 
 impl Network {
+    /// Whether the times of an empty message, and of one more byte, are those that a clock can show.
+    pub(super) fn is_possible(&self) -> bool {
+        let is_finite = self.bandwidth_bytes_per_s.is_finite();
+        is_finite && are_times([self.latency_s, 1.0 / self.bandwidth_bytes_per_s])
+    }
+
     /// Whether the user gave them.
     pub(crate) fn is_given(&self) -> bool {
         !self.measured && *self != ASSUMED
@@ -167,7 +170,7 @@ pub enum Comm {
 }
 
 /// Whether a clock can show all of these times.
-pub(super) fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
+fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
     times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 

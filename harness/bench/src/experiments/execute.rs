@@ -3,7 +3,6 @@
 
 use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
 use super::machine;
-use crate::refuse;
 use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::Failure;
@@ -62,17 +61,11 @@ impl Runner<'_> {
         let is_of_all = |phase: &PhaseReport| phase.time_cpu_s.len() >= setup.ranks;
         let phases = if report.phases.iter().all(is_of_all) { &report.phases[..] } else { &[] };
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
-        refuse(&[
-            (
-                setup.comm == Comm::Sim && phases.is_empty(),
-                "its run report has no phases, without which simulated ranks cannot be projected",
-            ),
-            (
-                setup.partitioner == METIS && not_metis,
-                "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use fewer \
-                 ranks or more cells",
-            ),
-        ])?;
+        let why = "its run report has no phases, without which simulated ranks cannot be projected";
+        Failure::unless(setup.comm != Comm::Sim || !phases.is_empty(), why)?;
+        let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use fewer \
+             ranks or more cells";
+        Failure::unless(setup.partitioner != METIS || !not_metis, why)?;
         let time_wall_s = report.time_wall_s.unwrap_or(finished.time_wall_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         let run = Run {
@@ -95,10 +88,8 @@ impl Runner<'_> {
             digest: report.digest.unwrap_or_default(),
             setup: setup.clone(),
         };
-        refuse(&[(
-            !run.is_possible(),
-            "its run report has numbers that no run can have, such as a time longer than that of its process",
-        )])?;
+        let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
+        Failure::unless(run.is_possible(), why)?;
         Ok(run)
     }
 }

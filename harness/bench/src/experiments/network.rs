@@ -1,6 +1,6 @@
 //! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
-use super::entry::{ASSUMED, Network, are_times};
+use super::entry::{ASSUMED, Network};
 use super::execute::Runner;
 use contract::number::number;
 use run::engine::process::{self, Watch};
@@ -72,19 +72,10 @@ fn parse(text: &str) -> Result<Network, String> {
 pub fn given(text: &str) -> Result<Network, String> {
     let numbers = text.split(',').map(|word| word.trim().parse::<f64>());
     let values = numbers.collect::<Result<Vec<f64>, _>>().unwrap_or_default();
-    match values[..] {
-        // Of an empty message, and of one more byte.
-        [latency_s, bandwidth_bytes_per_s]
-            if bandwidth_bytes_per_s.is_finite()
-                && are_times([latency_s, 1.0 / bandwidth_bytes_per_s]) =>
-        {
-            Ok(Network { latency_s, bandwidth_bytes_per_s, measured: false })
-        }
-        _ => {
-            Err("give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10"
-                .into())
-        }
-    }
+    let why = "give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10";
+    let [latency_s, bandwidth_bytes_per_s] = values[..] else { return Err(why.to_owned()) };
+    let network = Network { latency_s, bandwidth_bytes_per_s, measured: false };
+    if network.is_possible() { Ok(network) } else { Err(why.to_owned()) }
 }
 
 #[cfg(test)]

@@ -12,17 +12,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The content of the file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Rules {
     /// Tolerances of all cases.
-    #[serde(default)]
     pub tolerance: Tolerance,
     /// How times are compared.
-    #[serde(default)]
     pub time: TimeRules,
     /// The cases.
-    #[serde(default, rename = "case")]
+    #[serde(rename = "case")]
     pub cases: Vec<GateCase>,
 }
 

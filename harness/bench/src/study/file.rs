@@ -26,20 +26,16 @@ const RANKS: RangeInclusive<usize> = 1..=65_536;
 /// The [`Setup::experiment`] of runs for targets.
 pub const EXPERIMENT: &str = "targets";
 /// A study file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Study {
     /// Meshes by name.
-    #[serde(default)]
     pub mesh: BTreeMap<String, Mesh>,
     /// Runs by name.
-    #[serde(default)]
     pub run: BTreeMap<String, RunSpec>,
     /// The rows, in order.
-    #[serde(default)]
     pub row: Vec<Row>,
     /// The series, in order.
-    #[serde(default)]
     pub series: Vec<Series>,
     /// Directory of the file; paths are relative to it.
     #[serde(skip)]
@@ -171,7 +167,6 @@ pub struct Series {
     #[serde(default)]
     pub cells: Vec<f64>,
     /// Facets per rank (weak), which the case's generator makes; if missing, the facets of the case.
-    #[serde(default)]
     pub facets: Option<usize>,
     /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files, whose paths in the file are relative to
     /// it.
@@ -287,15 +282,14 @@ impl Study {
     }
 
     fn check_run(&self, run: &RunSpec) -> Result<(), String> {
+        let is_unit = ["", "unit"].contains(&run.weights.as_str());
+        let wrong_weights = run.partitioner == "paper" && !is_unit;
         let wrong_ranks = !RANKS.contains(&run.ranks) || run.comm == Comm::Solo && run.ranks != 1;
         refuse(&[
             (!self.mesh.contains_key(&run.mesh), &format!("no mesh is called {:?}", run.mesh)),
             (wrong_ranks, &format!("it cannot have {} ranks", run.ranks)),
             (run.repeats == 0, "repeats is at least 1"),
-            (
-                run.partitioner == "paper" && !["", "unit"].contains(&run.weights.as_str()),
-                "the paper's partition has weights of 1",
-            ),
+            (wrong_weights, "the paper's partition has weights of 1"),
         ])
     }
 
@@ -305,13 +299,11 @@ impl Study {
         }
         let (name, input) = (row.measure.name, row.measure.input);
         let [against, phase] = [input == Input::Against, input == Input::Phases];
+        let wrong_against = against != row.against.is_some();
         let least = if input == Input::Series { 2 } else { 1 };
         let needs = |needs: bool| if needs { "requires" } else { "does not accept" };
         refuse(&[
-            (
-                against != row.against.is_some(),
-                &format!("{name} {} a run in `against`", needs(against)),
-            ),
+            (wrong_against, &format!("{name} {} a run in `against`", needs(against))),
             (phase == row.phase.is_empty(), &format!("{name} {} a name in `phase`", needs(phase))),
             (row.run.len() < least, &format!("{name} requires {least} or more runs")),
         ])

@@ -85,10 +85,8 @@ pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
 
 /// Executes the invariants at the head of this file.
 fn check_invariants(judged: &Judged) {
-    let needs_reason = match judged.measured {
-        None => true,
-        Some((value, _)) => judged.row.measure.is_efficiency() && value > ABOVE_ONE,
-    };
+    let is_above = |value| judged.row.measure.is_efficiency() && value > ABOVE_ONE;
+    let needs_reason = judged.measured.is_none_or(|(value, _)| is_above(value));
     assert!(!needs_reason || !judged.why.is_empty(), "the row has a reason: {judged:?}");
 }
 

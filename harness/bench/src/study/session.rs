@@ -15,10 +15,11 @@ use crate::experiments::{machine, network};
 use crate::{jsonl, name_of};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use run::engine::interrupt;
 use run::engine::layout::Launcher;
 use run::engine::runner::Programs;
+use run::progress::Progress;
 use run::verify::options::whole_seconds;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -164,9 +165,7 @@ impl Session<'_> {
             }
         }
         for (row, number) in study.row.iter().zip(1..) {
-            if interrupt::requested() {
-                return Err(Failure::interrupted());
-            }
+            Progress.check()?;
             let judged = self.row(row)?;
             let [name, target, value, how, verdict] = judged.fields();
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");

@@ -67,10 +67,8 @@ impl<'a> Survey<'a> {
             knows_crossing: subject.promises.crossing || band_cells == 0.0,
         };
         check(&survey, result);
-        if result.examined == 0 {
-            let band = survey.band_cells;
-            result.lacks(format_args!("nothing lies beyond {band} cells from the geometry"));
-        }
+        let band = survey.band_cells;
+        result.needs_objects(&format!("nothing lies beyond {band} cells from the geometry"));
     }
 
     /// The position of an octant that no facet crosses.

@@ -123,9 +123,7 @@ impl<'a> Crossed<'a> {
                 ));
             }
         });
-        if result.examined == 0 {
-            result.lacks("the geometry crosses no leaf of the mesh");
-        }
+        result.needs_objects("the geometry crosses no leaf of the mesh");
     }
 
     /// The tree with the sides of its leaves replaced: crossing if a facet crosses a leaf of the surface level, else

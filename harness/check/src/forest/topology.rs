@@ -158,13 +158,11 @@ impl Topology {
         let all_edges = || all_places(trees, self.edges.places / 2);
         let all_corners = all_places(trees, 1 << self.dimension);
         let unlisted = "whose trees are no neighbours otherwise are in no list";
+        let reversed = "tree edges meet themselves in the opposite direction".to_owned();
         let found: [(String, Vec<Place>); 3] = [
             (format!("tree edges {unlisted}"), all_edges().filter(is_unlisted_edge).collect()),
             (format!("tree corners {unlisted}"), all_corners.filter(is_unlisted_corner).collect()),
-            (
-                "tree edges meet themselves in the opposite direction".to_owned(),
-                all_edges().filter(meets_itself).collect(),
-            ),
+            (reversed, all_edges().filter(meets_itself).collect()),
         ];
         let remarks = found.iter().filter_map(|(what, found)| {
             let (tree, place) = found.first()?;

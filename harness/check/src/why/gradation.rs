@@ -187,14 +187,14 @@ impl Search<'_> {
     /// Searches an octant with this content. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
     fn enter(&self, at: Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
         let is_hole = !content.is_node() && content.as_leaf().is_none();
-        if at == *self.octant || self.is_far(&at) || is_hole && !self.mesh.has_deleted_crossing() {
-            None
-        } else if is_hole {
-            self.hole(at, content, in_deleted)
-        } else if content.is_node() && self.counts_as_split(&at) {
-            self.descend(&at, content, false)
-        } else {
-            self.leaf(at)
+        match () {
+            () if at == *self.octant || self.is_far(&at) => None,
+            () if is_hole && !self.mesh.has_deleted_crossing() => None,
+            () if is_hole => self.hole(at, content, in_deleted),
+            () if content.is_node() && self.counts_as_split(&at) => {
+                self.descend(&at, content, false)
+            }
+            () => self.leaf(at),
         }
     }
 
@@ -222,14 +222,11 @@ impl Search<'_> {
     /// Whether an octant is split before the step that is asked about. Above the parents of the leaves that are
     /// searched, this need not be known: a leaf is visited only if its own parent is split.
     fn counts_as_split(&self, at: &Octant) -> bool {
-        if at.level >= self.mesh.level_deepest {
-            false
-        } else if at.level + 1 < self.first {
-            true
-        } else if at.level == self.octant.level {
-            self.mesh.is_deep(at)
-        } else {
-            self.mesh.is_justified(at)
+        match () {
+            () if at.level >= self.mesh.level_deepest => false,
+            () if at.level + 1 < self.first => true,
+            () if at.level == self.octant.level => self.mesh.is_deep(at),
+            () => self.mesh.is_justified(at),
         }
     }
 

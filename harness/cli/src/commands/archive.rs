@@ -12,7 +12,7 @@ use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use contract::files::{Staging, nearest_directory};
 use report::archive::{About, EXPECTED, METADATA, RECORD, STUDY, metadata, readme};
-use report::json::pretty;
+use report::pretty;
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;

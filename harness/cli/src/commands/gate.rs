@@ -7,7 +7,7 @@ use bench::gate::{GateOptions, gate};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use report::gate::{junit, markdown, text};
-use report::json::pretty;
+use report::pretty;
 
 /// `harness gate`.
 #[derive(Args, Debug)]

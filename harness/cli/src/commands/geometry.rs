@@ -7,7 +7,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
 use contract::lattice::Root;
 use geometry::diagnose;
 use geometry::input::{Input, Requested};
-use report::json::pretty;
+use report::pretty;
 use std::num::NonZero;
 
 /// `harness geometry`.

@@ -12,8 +12,7 @@ use contract::plain::{PlainCase, StlForm};
 use export::polydata;
 use geometry::leak::report::{Answers, Passage};
 use geometry::leak::{Leaks, Target};
-use report::json::pretty;
-use run::engine::interrupt;
+use report::pretty;
 use run::engine::layout::SERIAL;
 use run::engine::runner::{Given, Programs};
 use run::progress::Progress;
@@ -147,9 +146,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
             "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"
         );
     }
-    if interrupt::requested() {
-        return Err(Failure::interrupted());
-    }
+    Progress.check()?;
     if let Some(file) = arguments.vtk.as_deref().filter(|_| !passages.is_empty()) {
         let written = write_atomically(file, |out| polydata::paths(&passages, out));
         written.map_err(|error| Failure::at(file, error))?;

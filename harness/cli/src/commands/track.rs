@@ -8,7 +8,7 @@ use bench::track::history::{self, History, Record};
 use bench::track::{Series, VALUES_MIN, analyse};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
-use report::json::pretty;
+use report::pretty;
 use report::track::{junit, page, summary};
 use run::engine::paths::Paths;
 use std::path::{Path, PathBuf};

@@ -22,6 +22,7 @@ use std::path::Path;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
+use contract::number::numbered;
 use contract::sets::Sets;
 use contract::word::{self, Side};
 use geometry::tree::{FacetTree, Point};
@@ -209,9 +210,7 @@ impl Patches {
         for solid in solids.filter(|solid| solid.facets > 0) {
             let patch = *patch_of.entry(&solid.name).or_insert_with(|| {
                 let name = patch_name(solid.name.as_deref().unwrap_or_default());
-                let numbered = (2..).map(|number| format!("{name}_{number}"));
-                let mut choices = std::iter::once(name.clone()).chain(numbered);
-                names.extend(choices.find(|name| !names.contains(name)));
+                names.push(numbered(&name, '_', |name| !names.contains(name)));
                 names.len() - 1
             });
             of_facet.extend(std::iter::repeat_n(patch, solid.facets));

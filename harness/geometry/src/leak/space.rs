@@ -208,9 +208,7 @@ impl<'a> Space<'a> {
                 path.reverse();
                 return Ok(Some((path, label.0)));
             }
-            if watch.is_interrupted() {
-                return Err(Failure::interrupted());
-            }
+            watch.check()?;
             joined.clear();
             self.neighbours(cell, &mut joined);
             for &next in &joined {

@@ -17,7 +17,7 @@ use statistics::Median;
 use std::fmt::Write;
 
 /// A result, as it is printed.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Number {
     /// Its key.
     pub key: String,
@@ -67,13 +67,8 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         let [interval, coverage] = if median.coverage > 0.0 { ends } else { Default::default() };
         Some(Number { key, value: digits(value), interval, coverage, unit })
     };
-    let cells = Number {
-        key: format!("{setup}/cells"),
-        value: grouped(group.cells()),
-        interval: String::new(),
-        coverage: String::new(),
-        unit: "cells",
-    };
+    let (key, value) = (format!("{setup}/cells"), grouped(group.cells()));
+    let cells = Number { key, value, unit: "cells", ..Number::default() };
     quantities.into_iter().filter_map(number).chain([cells]).collect()
 }
 

@@ -22,8 +22,8 @@ use axes::Scale;
 pub use axes::tick_label;
 use map::Map;
 
+use contract::number::numbered;
 use std::collections::BTreeSet;
-use std::iter;
 
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -198,9 +198,7 @@ pub fn file_name(text: &str) -> String {
 pub fn name_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut taken = BTreeSet::new();
     for name in names {
-        let numbered = (2..).map(|number| format!("{name}-{number}"));
-        let mut all = iter::once(name.clone()).chain(numbered);
-        *name = all.find(|free| taken.insert(free.clone())).expect("numbers do not end");
+        *name = numbered(name, '-', |free| taken.insert(free.clone()));
     }
 }
 

@@ -6,11 +6,11 @@
 
 use super::colour::Colour;
 use super::plane_axes;
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::mesh::Mesh;
 use contract::octant::CELLS_PER_EDGE;
 use export::selection::Selection;
-use run::engine::interrupt;
+use run::progress::Progress;
 
 /// Edge of the smallest square, in units of the page.
 const EDGE_MIN: f64 = 1.0;
@@ -74,8 +74,7 @@ impl Squares {
     ) -> Result<Self, Failure> {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let mut found = Self { level_outlined, level_drawn, ..Self::default() };
-        let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
-        selection.visit(mesh, &check, &mut |leaf| {
+        selection.visit(mesh, &|| Progress.check(), &mut |leaf| {
             let (octant, value) = (leaf.octant, colour.value(&leaf));
             let corner = axes.map(|a| octant.corner[a]);
             found.add(Square { corner, level: octant.level, value, leaves: 1 });

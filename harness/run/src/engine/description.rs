@@ -41,30 +41,24 @@ const EXAMPLES: [(&str, &str); 11] = [
 ];
 
 /// An engine file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Description {
     /// A sentence about the engine.
-    #[serde(default)]
     pub about: String,
     /// The program, `{program}` in templates; by default the first word of `serial`. The command line may name another
     /// one.
-    #[serde(default)]
     pub program: String,
     /// Command templates. A file without them states promises only, and its engine cannot be run.
-    #[serde(default)]
     pub run: Templates,
     /// Features of a case that the engine supports.
-    #[serde(default)]
     pub takes: Takes,
     /// Limits on cases.
-    #[serde(default)]
     pub limits: Limits,
     /// What its meshes guarantee; by default the definition.
     #[serde(default = "Promises::of_definition")]
     pub promises: Promises,
     /// Whether the run report has the peak memory, so that the harness need not sample it.
-    #[serde(default)]
     pub reports_memory: bool,
     /// How a revision is built, for `harness gate --baseline REVISION`.
     pub build: Option<Build>,

@@ -79,9 +79,7 @@ impl<'a> Watch<'a> {
             if let Some(found) = look()? {
                 return Ok(found);
             }
-            if interrupt::requested() {
-                return Err(End::Interrupted);
-            }
+            check_interrupt()?;
             if start.elapsed() >= self.limit {
                 let activity = self.status.map(activity);
                 return Err(End::TimedOut { limit: self.limit, activity });
@@ -118,9 +116,7 @@ pub fn printed(command: &mut Command) -> Option<String> {
 }
 
 fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
-    if interrupt::requested() {
-        return Err(End::Interrupted);
-    }
+    check_interrupt()?;
     let mut start = || -> io::Result<_> {
         let (stdout, stderr) = (log(&watch.log("stdout"))?, log(&watch.log("stderr"))?);
         command.stdin(Stdio::null()).stdout(stdout.try_clone()?).stderr(stderr.try_clone()?);
@@ -147,11 +143,13 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     }
     let (status, time_cpu_s) = ended?;
     // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
-    if interrupt::requested() {
-        return Err(End::Interrupted);
-    }
+    check_interrupt()?;
     judge(status, outputs[1])?;
     Ok(Finished { time_wall_s, time_cpu_s, stdout: watch.log("stdout"), peak_rss_bytes })
+}
+
+fn check_interrupt() -> Result<(), End> {
+    if interrupt::requested() { Err(End::Interrupted) } else { Ok(()) }
 }
 
 pub(super) fn cannot_be_started(command: &Command, error: &io::Error) -> End {

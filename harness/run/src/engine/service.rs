@@ -8,14 +8,14 @@
 use super::failure::{End, Failure};
 use super::interrupt;
 use super::process::{self, Watch};
-use super::session::{Session, end_all};
+use super::session::{Session, end_all, wait_while};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::thread::{self, sleep};
+use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -158,10 +158,8 @@ impl Service {
         });
         let time_s = self.sent.elapsed().as_secs_f64();
         // A launcher may pass on the error after the answer.
-        let late = Instant::now() + LATE;
-        let is_late = || code.as_ref().is_ok_and(|&code| code != 0) && Instant::now() < late;
-        while is_late() && !process::end_of(errors).ends_with('\n') {
-            sleep(Duration::from_millis(5));
+        if code.as_ref().is_ok_and(|&code| code != 0) {
+            wait_while(LATE, || !process::end_of(errors).ends_with('\n'));
         }
         if code != Ok(0) {
             let _ = fs::write(watch.log("stderr"), process::end_of(errors));
@@ -196,11 +194,7 @@ fn lines_of(output: ChildStdout) -> io::Result<Receiver<String>> {
 impl Drop for Service {
     fn drop(&mut self) {
         drop(self.requests.take());
-        let patience = Instant::now() + PATIENCE;
-        let is_waiting = || !interrupt::requested() && Instant::now() < patience;
-        while is_waiting() && self.session.runs() {
-            sleep(Duration::from_millis(5));
-        }
+        wait_while(PATIENCE, || !interrupt::requested() && self.session.runs());
         self.session.end();
     }
 }

@@ -115,11 +115,16 @@ pub(super) fn end_all() -> MutexGuard<'static, Vec<Pid>> {
 
 fn end(leaders: &[Pid], running: &[Pid]) {
     signal(leaders, Signal::TERM);
-    let patience = Instant::now() + PATIENCE;
-    while leaders.iter().any(|&leader| !members(leader).is_empty()) && Instant::now() < patience {
-        sleep(Duration::from_millis(10));
-    }
+    wait_while(PATIENCE, || leaders.iter().any(|&leader| !members(leader).is_empty()));
     kill(leaders, running);
+}
+
+/// Waits as long as a condition holds, and no longer than this.
+pub(super) fn wait_while(limit: Duration, mut holds: impl FnMut() -> bool) {
+    let end = Instant::now() + limit;
+    while holds() && Instant::now() < end {
+        sleep(Duration::from_millis(5));
+    }
 }
 
 /// Kills every process of these sessions, and those that this process has adopted: its children in other sessions than those that are
