@@ -28,16 +28,14 @@ impl Sum {
         self.terms.iter().map(|(term, coefficient)| coefficient * terms[*term]).sum()
     }
 
-    /// The sum that extrapolates best of at most so many `kinds` of terms, the shortest one of several; if it may have all, that of all which are not
-    /// subtracted. Terms of one kind are chosen together. `None` without values at three places.
+    /// The sum that extrapolates best of terms of at most so many kinds, the shortest one of several; if it may have all kinds, all terms are
+    /// fitted, without those that would be subtracted. `kinds` has the kind of each term, numbered from 0; terms of one kind are chosen together.
+    /// `None` without values at three places.
     pub fn fit(rows: &[Row], kinds: &[usize], most: usize) -> Option<Self> {
         let mut places: Vec<f64> = rows.iter().map(|row| row.0).collect();
         places.sort_by(f64::total_cmp);
         places.dedup();
         let [_, .., before, last] = places[..] else { return None };
-        let of_kinds = |chosen: &[usize]| {
-            (0..kinds.len()).filter(|term| chosen.contains(&kinds[*term])).collect::<Vec<_>>()
-        };
         let all = Products::of(rows);
         let count = kinds.iter().max().map_or(0, |last| last + 1);
         if most >= count {
@@ -45,12 +43,20 @@ impl Sum {
         }
         places.retain(|place| (before.min(0.5 * last)..last).contains(place));
         let split = |cut: &f64| {
-            let (known, further): (Vec<Row>, _) = rows.iter().cloned().partition(|r| r.0 <= *cut);
-            (Products::of(&known), further)
+            let (known, mut further): (Vec<Row>, Vec<Row>) =
+                rows.iter().cloned().partition(|row| row.0 <= *cut);
+            let known = Products::of(&known);
+            // Nothing predicts a value with a term that no value before it has.
+            further.retain(|row| {
+                row.2.iter().zip(&known.sums).all(|(of, sum)| *of == 0.0 || *sum > 0.0)
+            });
+            (known, further)
         };
-        let splits: Vec<(Products, Vec<Row>)> = places.iter().map(split).collect();
+        let mut splits: Vec<(Products, Vec<Row>)> = places.iter().map(split).collect();
+        splits.retain(|(_, further)| !further.is_empty());
         let candidate = |chosen: Vec<usize>| {
-            let chosen = of_kinds(&chosen);
+            let terms = 0..kinds.len();
+            let chosen: Vec<usize> = terms.filter(|term| chosen.contains(&kinds[*term])).collect();
             let sum = |of: &Products| Self::of_terms(of, chosen.clone());
             let beyond = |(known, further): &(Products, Vec<Row>)| sum(known).error(further);
             (splits.iter().map(beyond).sum::<f64>().max(EXACT), sum(&all))
@@ -172,6 +178,17 @@ mod tests {
         let sum =
             Sum::fit(&rows(&factors.map(|(x, factor)| [x, factor / x])), &[0, 1, 2, 3], 2).unwrap();
         assert_eq!(sum.terms.iter().map(|term| term.0).collect::<Vec<_>>(), [3]);
+    }
+
+    #[test]
+    fn a_value_with_a_term_that_none_before_it_has_chooses_no_terms() {
+        // 3/x, and elsewhere 5/x, which was measured at the last place only. The third term is a constant.
+        let first = |x: f64| (x, 1.0, vec![1.0 / 3.0, 0.0, x / 3.0]);
+        let mut rows = [4.0, 8.0, 16.0, 32.0, 64.0].map(first).to_vec();
+        rows.extend([64.0; 20].map(|x| (x, 1.0, vec![0.0, 1.0 / 5.0, x / 5.0])));
+        let sum = Sum::fit(&rows, &[0, 0, 1], 1).unwrap();
+        let off = |at: &[f64], value: f64| (sum.at(at) - value).abs();
+        assert!(off(&[1.0, 0.0, 1.0], 3.0).max(off(&[0.0, 1.0, 1.0], 5.0)) < 1e-9, "{sum:?}");
     }
 
     #[test]

@@ -4,9 +4,9 @@
 //! depends on the geometry has coefficients of that geometry, and what collective operations send has those of the program, as it is the same
 //! around all geometries: so counters around all of them are fitted together. The mean time of a phase is then a sum of costs times means of
 //! counters. These costs are of the program and the machine, and fitted together as well: facets, cells and ranks vary independently of each
-//! other only there. The excess of a maximum over its mean is (a x + b √x + c) ln p + d x√p, where x is the part of the mean that differs from
-//! rank to rank: ranks differ in proportion to their work, by chance, and by what hits one of them, and the greatest of p values with an
-//! exponential tail lies ln p above; and a counter may be that of a place which is not divided in proportion to the ranks. A phase takes as long
+//! other only there. The excess of a maximum over its mean is (a x + b √x + c) ln p, where x is the mean of a time, or the part of a counter's
+//! mean that depends on the geometry: ranks differ in proportion to their work, by chance, and by what hits one of them, and the greatest of p values with an
+//! exponential tail lies ln p above. For a counter d x√p may be added: more ranks may divide a place less than in proportion. A phase takes as long
 //! as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
 //!
 //! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same quantity in
@@ -16,7 +16,8 @@
 //! as many to the quantity itself, if this is more than 1. The quantile is that of split conformal prediction, without its guarantee, as later
 //! runs are not exchangeable with earlier ones: so the share of held-out values within bands is reported beside them.
 //!
-//! Only positive values are compared, and a counter that is below one per rank in some fitted run explains no time and has no law.
+//! Only positive values are compared, and a counter that is below one per rank in some fitted run around the geometry explains no time and has no law; such runs
+//! around others are left out.
 //!
 //! Square errors have the weight of the ranks, because runs on more ranks are nearer to what is predicted. Runs on one rank are left out: they
 //! have no messages, no halos and other phases.
@@ -39,7 +40,7 @@ pub struct At {
     pub facets: f64,
 }
 
-/// The terms of the excess of a maximum over a mean, for the part x of the mean that differs from rank to rank.
+/// The terms of the excess of a maximum over a mean, for x as above.
 fn excesses(x: f64, ranks: f64) -> [f64; 4] {
     [x * ranks.ln(), x.sqrt() * ranks.ln(), ranks.ln(), x * ranks.sqrt()]
 }
@@ -65,7 +66,7 @@ const TERMS: [Function; 9] = [
 ];
 
 /// So many of them, the first ones, depend on the geometry and differ from rank to rank: each geometry has coefficients of its own. What the
-/// others count is the same on all ranks, and around all geometries.
+/// others count is taken to be the same on all ranks, and around all geometries.
 const GEOMETRIC: usize = 4;
 
 /// Terms of times beside counters.
@@ -103,7 +104,9 @@ struct Term<'a> {
     value: f64,
     /// Terms of one kind are chosen together.
     kind: usize,
-    /// Whether it is the same on all ranks.
+    /// Whether it is a term of the run's geometry.
+    is_own: bool,
+    /// Whether it is taken to be the same on all ranks.
     is_even: bool,
 }
 
@@ -139,7 +142,11 @@ impl Sample {
         let (run, ranks) = (&group.typical, group.setup.ranks as f64);
         let at = At { cells: run.cells as f64, ranks, facets: run.facets as f64 };
         let ends = |of: &Spread| [of.sum / ranks, of.max];
-        let counters = run.counters.iter();
+        // The phases' messages are counted apart, and a greatest value counts nothing.
+        let is_count = |(name, _): &(&String, &Spread)| {
+            !["messages", "message_bytes"].contains(&name.as_str()) && !name.ends_with("_max")
+        };
+        let counters = run.counters.iter().filter(is_count);
         let counters = counters.map(|(name, of)| ((Kind::Counter, name.clone()), ends(of)));
         let mut of: Quantities = counters.collect();
         for phase in &run.phases {
@@ -147,10 +154,8 @@ impl Sample {
             of.extend(traffic(&phase.name).into_iter().zip(messages));
             of.insert((Kind::Phase, phase.name.clone()), ends(&phase.useful_s));
         }
-        // What happens less than once on a rank explains no time, and a greatest value counts nothing. The phases' messages are counted apart.
-        let is_none =
-            |name: &str| ["messages", "message_bytes"].contains(&name) || name.ends_with("_max");
-        of.retain(|(kind, name), [mean, _]| *kind == Kind::Phase || *mean >= 1.0 && !is_none(name));
+        // What happens less than once on a rank explains no time.
+        of.retain(|(kind, _), [mean, _]| *kind == Kind::Phase || *mean >= 1.0);
         of.insert(run_time(), [group.time_s.value; 2]);
         let geometry = geometries.iter().position(|case| *case == group.setup.case);
         Self { geometry: geometry.expect("a known one"), at, of, network: group.network }
@@ -159,6 +164,7 @@ impl Sample {
 
 /// A mean over the ranks, and the excess of the maximum.
 struct Law {
+    /// Of the [`terms`] around one geometry.
     mean: Sum,
     /// Of [`excesses`].
     excess: Sum,
@@ -187,11 +193,12 @@ impl Law {
         let is_fitted = |s: &Sample| key.0 == Kind::Phase || s.geometry == 0;
         let rows: Vec<Row> = known.iter().filter(|known| is_fitted(known.0)).map(row).collect();
         let excess = Sum::fit(&rows, &[0, 1, 2, 3][..excess_kinds], most)?;
-        let names: Vec<&str> = own.iter().map(|term| term.name).collect();
-        let is_own = |(term, _): &&(usize, f64)| own[*term].value > 0.0;
-        let of_own: Vec<_> = mean.terms.iter().filter(is_own).copied().collect();
-        let formulas = [formula(&of_own, &names), formula(&excess.terms, &EXCESSES)];
-        Some(Self { mean, excess, formulas })
+        let of_own: Vec<_> = mean.terms.iter().filter(|(term, _)| own[*term].is_own).collect();
+        let terms: Vec<_> = of_own.iter().map(|(term, of)| (own[*term].kind, *of)).collect();
+        let names = of_own.iter().map(|(term, of)| (own[*term].name, *of));
+        let of_excess = excess.terms.iter().map(|(term, of)| (EXCESSES[*term], *of));
+        let formulas = [formula(names), formula(of_excess)];
+        (!terms.is_empty()).then_some(Self { mean: Sum { terms }, excess, formulas })
     }
 
     /// Mean and maximum for the values of all terms.
@@ -203,23 +210,21 @@ impl Law {
 }
 
 /// A sum of terms with their names.
-fn formula(terms: &[(usize, f64)], names: &[&str]) -> String {
-    let term = |(term, of): &(usize, f64)| format!("{of:.1e} {}", names[*term]);
-    terms.iter().map(|of| term(of).trim().to_owned()).collect::<Vec<_>>().join(" + ")
+fn formula<'a>(terms: impl Iterator<Item = (&'a str, f64)>) -> String {
+    let term = |(name, of)| format!("{of:.1e} {name}").trim().to_owned();
+    terms.map(term).collect::<Vec<_>>().join(" + ")
 }
 
-/// The part of a mean that differs from rank to rank.
+/// The part of a mean that is not taken to be the same on all ranks.
 fn uneven(mean: &Sum, terms: &Terms) -> f64 {
     let value = |term: &Term| if term.is_even { 0.0 } else { term.value };
     mean.at(&terms.iter().map(value).collect::<Vec<f64>>())
 }
 
-/// A model of the runs of one program around one geometry with one n.
+/// A model of the runs of one program around one geometry with one n, fitted with those around others.
 struct Model {
     /// The most cells and ranks that were fitted.
     most: At,
-    /// Number of geometries of the runs that were fitted.
-    geometries: usize,
     /// Of counters, then of phases in the program's order.
     laws: Vec<(Key, Law)>,
 }
@@ -237,10 +242,10 @@ fn terms<'a>(
         let geometric =
             (0..geometries).flat_map(|of| (0..GEOMETRIC).map(move |i| (i, of == geometry)));
         let common = (GEOMETRIC..TERMS.len()).map(|i| (i, true));
-        let term = |(kind, is_in): (usize, bool)| {
+        let term = |(kind, is_own): (usize, bool)| {
             let (name, of) = TERMS[kind];
-            let value = if is_in { of(at) } else { 0.0 };
-            Term { name, value, kind, is_even: kind >= GEOMETRIC }
+            let value = if is_own { of(at) } else { 0.0 };
+            Term { name, value, kind, is_own, is_even: kind >= GEOMETRIC }
         };
         return geometric.chain(common).map(term).collect();
     }
@@ -250,7 +255,7 @@ fn terms<'a>(
     let causes = laws.iter().map(|law| &law.0).filter(is_cause);
     let means = causes.map(|key| (key.1.as_str(), of.get(key).map_or(0.0, |ends| ends[0])));
     let all = means.chain(OTHER_CAUSES.map(|(name, term)| (name, term(at))));
-    let term = |(kind, (name, value))| Term { name, value, kind, is_even: false };
+    let term = |(kind, (name, value))| Term { name, value, kind, is_own: true, is_even: false };
     all.enumerate().map(term).collect()
 }
 
@@ -273,14 +278,14 @@ impl Model {
             let law = Law::fit(&fitted.collect::<Vec<_>>(), &key, of);
             laws.extend(law.map(|law| (key, law)));
         }
-        Some(Self { most, geometries, laws })
+        Some(Self { most, laws })
     }
 
     /// All quantities, and the time of a run.
     fn predict(&self, at: &At, network: &Network) -> Quantities {
         let (mut all, mut run_s) = (BTreeMap::new(), 0.0);
         for (key, law) in &self.laws {
-            let ends = law.at(&terms(&self.laws, key, (0, self.geometries), at, &all), at);
+            let ends = law.at(&terms(&self.laws, key, (0, 1), at, &all), at);
             if key.0 == Kind::Phase {
                 let most = |key: Key| all.get(&key).map_or(0.0, |of: &Ends| of[1]);
                 let [messages, bytes] = traffic(&key.1).map(most);
@@ -354,7 +359,7 @@ pub struct Tested {
 }
 
 impl Tested {
-    /// Of the groups of one program and n on two and more simulated ranks, around a case; costs are also of those around other cases. Held out
+    /// Of the groups of one program and n on two and more simulated ranks, around a case; costs, and what all geometries have in common, are also of those around other cases. Held out
     /// are those on more than a `share` of the most ranks. `None` if too few are left, or if fewer than nine predictions can be made in retrospect.
     pub fn of(groups: &[&Group], case: &str, share: f64) -> Option<Self> {
         let mut groups = groups.to_vec();
@@ -410,7 +415,7 @@ impl Tested {
         (!of.is_empty()).then(|| ([0, 1].map(|end| median_of(&errors(end))), held, of.len()))
     }
 
-    /// Quantities of the model with mean and imbalance as formulas.
+    /// Quantities of the model with mean and excess as formulas.
     pub fn formulas(&self) -> Vec<(Key, [String; 2])> {
         let time = "sum of the phases on their slowest ranks, and messages";
         let time = (run_time(), [time, ""].map(str::to_owned));
@@ -468,7 +473,7 @@ mod tests {
 
     #[test]
     fn laws_and_costs_are_found_again_and_predict_what_was_held_out() {
-        // The costs are those around the other case, and its counters are not used.
+        // The costs are those around the other case, and the terms of what its ranks send.
         for cases in [&[CASE][..], &[CASE, "other"]] {
             let tested = tested(cases);
             assert_eq!(tested.fitted, 64.0);
@@ -504,6 +509,7 @@ mod tests {
         let samples: Vec<&Sample> = first.iter().chain(&second).collect();
         let of = |s: &Sample| terms(&[], &key, (s.geometry, 2), &s.at, &s.of);
         let law = Law::fit(&samples, &key, of).unwrap();
+        let of = |s: &Sample| terms(&[], &key, (0, 1), &s.at, &s.of);
         assert_eq!(law.formulas, ["3.0e-1 N/p + 8.0e1 (p – 1)", "1.0e-1 x ln p"]);
         let far = sample(0, 1e8, 1024.0);
         let [mean, max] = law.at(&of(&far), &far.at);
@@ -558,7 +564,7 @@ mod tests {
         };
         let fit = |samples: &[Sample]| {
             Law::fit(&samples.iter().collect::<Vec<_>>(), &(Kind::Phase, "a".to_owned()), |_| {
-                vec![Term { name: "", value: 1.0, kind: 0, is_even: false }]
+                vec![Term { name: "", value: 1.0, kind: 0, is_own: true, is_even: false }]
             })
         };
         assert!(

@@ -17,7 +17,7 @@ const HELD_OUT: [f64; 2] = [1.0 / 16.0, 0.25];
 /// Of the prediction beyond all runs.
 const FAR: At = At { cells: 1e12, ranks: 1e5, facets: 0.0 };
 
-/// A model with its subject, its runs on several simulated ranks, and those around all cases, which have the same costs.
+/// A model with its subject, its runs on several simulated ranks, and those around all cases, which have the same costs and common terms.
 type Modelled<'a> = (Subject<'a>, Vec<&'a Group>, Vec<&'a Group>, Tested);
 
 /// Every model of a record.
@@ -79,7 +79,7 @@ fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Tabl
         &[
             ("quantity", &|(key, _)| key.1.clone()),
             ("mean of the ranks", &|(_, [mean, _])| mean.clone()),
-            ("max – mean, for\na mean of x", &|(_, [_, excess])| excess.clone()),
+            ("max – mean", &|(_, [_, excess])| excess.clone()),
             ("errors of\nheld-out\nmaxima / %", &|(key, _)| errors(key)),
         ],
     )
@@ -91,7 +91,7 @@ fn notes(modelled @ (_, of, _, model): &Modelled) -> Vec<String> {
         format!("{ranks} ranks and {} cells", grouped(cells as u64))
     });
     let mut notes = vec![format!(
-        "N cells, F facets, p ranks. Fitted are runs on {} to {} simulated ranks. Errors are of these runs, which were held out: {}.",
+        "N cells, F facets, p ranks; x is the mean of a time, and the part of a counter's mean with N or F. Fitted are runs on {} to {} simulated ranks. Errors are of these runs, which were held out: {}.",
         of.iter().map(|group| group.setup.ranks).min().unwrap_or(0),
         model.fitted,
         runs.collect::<Vec<_>>().join("; ")
