@@ -5,9 +5,10 @@
 //! around all geometries: so counters around all of them are fitted together. The mean time of a phase is then a sum of costs times means of
 //! counters. These costs are of the program and the machine, and fitted together as well: facets, cells and ranks vary independently of each
 //! other only there. The excess of a maximum over its mean is (a x + b √x + c) ln p, where x is the mean of a time, or the part of a counter's
-//! mean that depends on the geometry: ranks differ in proportion to their work, by chance, and by what hits one of them, and the greatest of p values with an
-//! exponential tail lies ln p above. For a counter d x√p may be added: more ranks may divide a place less than in proportion. A phase takes as long
-//! as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
+//! mean that depends on the geometry: ranks differ in proportion to their work, by chance, and by what hits one of them, and the greatest of p
+//! values with an exponential tail lies ln p above. For a counter d x√p may be added: more ranks may divide a place less than in proportion. A
+//! phase takes as long as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all
+//! phases.
 //!
 //! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same quantity in
 //! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, each divided by
@@ -16,8 +17,8 @@
 //! as many to the quantity itself, if this is more than 1. The quantile is that of split conformal prediction, without its guarantee, as later
 //! runs are not exchangeable with earlier ones: so the share of held-out values within bands is reported beside them.
 //!
-//! Only positive values are compared, and a counter that is below one per rank in some fitted run around the geometry explains no time and has no law; such runs
-//! around others are left out.
+//! Only positive values are compared, and a counter that is below one per rank in some fitted run around the geometry explains no time and has
+//! no law; such runs around others are left out.
 //!
 //! Square errors have the weight of the ranks, because runs on more ranks are nearer to what is predicted. Runs on one rank are left out: they
 //! have no messages, no halos and other phases.
