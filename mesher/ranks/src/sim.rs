@@ -12,6 +12,7 @@ pub use world::{Adversary, Arrival, Schedule, World};
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use world::Call;
 
@@ -27,6 +28,13 @@ pub struct Sim<'a> {
 /// # Panics
 /// With the panic of the lowest rank that panicked; the other ranks are stopped.
 pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + Sync) -> Vec<T> {
+    let results: Vec<_> = (0..size).map(|_| Mutex::new(None)).collect();
+    run_ranks(size, seed, &|sim| *results[sim.rank()].lock().expect("no panic") = Some(body(sim)));
+    results.into_iter().map(|r| r.into_inner().ok().flatten().expect("the rank ended")).collect()
+}
+
+/// Without type parameters, as a test suite has dozens of bodies.
+fn run_ranks(size: usize, seed: u64, body: &(dyn Fn(&Metered<Sim>) + Sync)) {
     let world = World::new(size, Adversary::new(seed));
     // What a rank waits for: true when it runs next, false when no rank can go on.
     let (turns, turns_of): (Vec<Sender<bool>>, Vec<_>) = (0..size).map(|_| channel()).unzip();
@@ -35,15 +43,11 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
         None => turns.iter().for_each(|turn| _ = turn.send(false)),
     };
     pass_on();
-    let mut results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
+    let panics: Vec<Box<dyn Any + Send>> = std::thread::scope(|scope| {
         let spawn = |(rank, turn): (usize, Receiver<bool>)| {
-            let (world, body, pass_on) = (&world, &body, &pass_on);
+            let (world, pass_on) = (&world, &pass_on);
             let run = move || {
-                let wait = || {
-                    if turn.recv() != Ok(true) {
-                        panic_any(STOPPED);
-                    }
-                };
+                let wait = || turn.recv() == Ok(true) || panic_any(STOPPED);
                 wait();
                 let pass = || {
                     pass_on();
@@ -59,12 +63,11 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
             builder.spawn_scoped(scope, run).expect("a thread per simulated rank")
         };
         let handles: Vec<_> = turns_of.into_iter().enumerate().map(spawn).collect();
-        handles.into_iter().map(|t| t.join().flatten()).collect()
+        handles.into_iter().filter_map(|t| t.join().flatten().err()).collect()
     });
-    let is_cause = |p: &Box<dyn Any + Send>| p.downcast_ref() != Some(&STOPPED);
-    let cause = results.iter().position(|r| r.as_ref().is_err_and(is_cause));
-    results.swap(0, cause.unwrap_or(0));
-    results.into_iter().map(|r| r.unwrap_or_else(|p| resume_unwind(p))).collect()
+    if let Some(p) = panics.into_iter().min_by_key(|p| p.downcast_ref() == Some(&STOPPED)) {
+        resume_unwind(p);
+    }
 }
 
 const STOPPED: &str = "stopped because another simulated rank panicked";
