@@ -1,7 +1,7 @@
 //! What the runs of a record must give when they are repeated elsewhere: digests and counts exactly, ratios within bands. Times are
 //! those of a machine, so they are shown and not judged.
 //!
-//! Invariants, executed by [`Expected::check_invariants`] before anything is written or printed: a quantity of a run is there once; a band
+//! Invariants, executed by `Expected::check_invariants` before anything is written or printed: a quantity of a run is there once; a band
 //! contains its value. Verdicts are not stored: they follow from both values.
 
 use crate::experiments::entry::{Line, Run};

@@ -4,7 +4,7 @@
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
-//! data of each quadrant, one byte, is its side, [`NO_SIDE`] or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
+//! data of each quadrant, one byte, is its side, `NO_SIDE` or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
 //! The saved partition is that of one rank: p4est makes a uniform one, which is that of the mesher within its tolerance.
 
 use std::io::{BufWriter, Seek, SeekFrom, Write};

@@ -1,8 +1,8 @@
 //! Geometries: their diagnosis before they are meshed, and [`leak`]s through their openings.
 //!
 //! - [`input`]: the file, its root, the body's position there, and the cell's edge length;
-//! - [`edges`]: facets that share vertices and edges; [`shells`] and [`openings`] build on it;
-//! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
+//! - `edges`: facets that share vertices and edges; `shells` and `openings` build on it;
+//! - [`tree`]: facets in a tree of boxes, for `intersections`, `sheets` and leaks;
 //! - [`finding`] and [`report`]: the result as data and for a terminal.
 //!
 //! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that

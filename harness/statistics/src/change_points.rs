@@ -1,6 +1,6 @@
 //! Steps of a series that may have trends, autocorrelated noise and outliers.
 //!
-//! The model has [segments](super::segments) with constant or linear means, and first-order autoregressive noise. Of all numbers
+//! The model has segments with constant or linear means, and first-order autoregressive noise. Of all numbers
 //! of boundaries, kinds of means and autocorrelations, the one with the least penalised likelihood is selected (Davis, Lee and
 //! Rodriguez-Yam, 2006), so that a drift is one line rather than many steps, and a slow random fluctuation is noise. The
 //! p-value of a step is that of the likelihood ratio without its boundary, times the number of values at which it

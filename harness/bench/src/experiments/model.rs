@@ -1,6 +1,6 @@
 //! Models of a program's phases on simulated ranks, to predict what was not measured.
 //!
-//! A counter is exact, so it comes first: its mean over the ranks is a [`Sum`] of [`TERMS`], functions of cells N, ranks p and facets F. What
+//! A counter is exact, so it comes first: its mean over the ranks is a [`Sum`] of `TERMS`, functions of cells N, ranks p and facets F. What
 //! depends on the geometry has coefficients of that geometry, and what collective operations send has those of the program, as it is the same
 //! around all geometries: so counters around all of them are fitted together. The mean time of a phase is then a sum of costs times means of
 //! counters. These costs are of the program and the machine, and fitted together as well: facets, cells and ranks vary independently of each

@@ -1,7 +1,7 @@
 //! `harness shrink`: reduces a failing case.
 //!
 //! [`probe`] finds the checks that a case fails; [`reduce`] removes everything that the failure does not need: depth, facets, layer
-//! cells, boxes, seeds, ranks; [`write`] writes the small case with the command that repeats the failure.
+//! cells, boxes, seeds, ranks; [`write()`] writes the small case with the command that repeats the failure.
 //!
 //! Invariant: the reduced case fails the same check as the given one. A different failure is a different bug and does not
 //! count.

@@ -5,7 +5,7 @@
 //! every hole must be one that deletion can leave: a leaf lacks a neighbour across a face only if the definition may delete the
 //! neighbours of such a leaf. Then the check cannot detect a missing leaf if all leaves around it may
 //! lack neighbours, for example a crossing leaf among crossing leaves. A promise of less than the definition is judged beyond a
-//! band around the geometry ([`super::region`]).
+//! band around the geometry (`super::region`).
 
 use super::contact;
 use super::region::Survey;

@@ -6,7 +6,7 @@
 //! the side of T0's leaf. The manifest must state the number of ambiguous components, and the leaks. Without the case:
 //! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that
 //! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
-//! definition is judged beyond a band around the geometry ([`super::region`]).
+//! definition is judged beyond a band around the geometry (`super::region`).
 
 use super::components::{self, Component};
 use super::contact;

@@ -1,6 +1,6 @@
 //! Why a leaf has its size and its side, and which splits of a mesh are needless or missing.
 //!
-//! - [`gradation`]: T0 (section 3 of reference/DEFINITION.md), and the leaves that force an octant to split (section 6);
+//! - `gradation`: T0 (section 3 of reference/DEFINITION.md), and the leaves that force an octant to split (section 6);
 //! - [`answer`]: the answer about a point, with a chain of such leaves to a cause in T0; [`Mesh::audit`]: the splits of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,

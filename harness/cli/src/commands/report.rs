@@ -26,7 +26,7 @@ pub struct Arguments {
 /// Writes the report; returns the exit code.
 ///
 /// # Errors
-/// As [`write`], or if a text cannot be read.
+/// As [`write()`], or if a text cannot be read.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let numbers = write(&arguments.directory, &arguments.record)?;
     let mut code = EXIT_HOLDS;

@@ -6,8 +6,8 @@
 //!
 //! All is held in arrays, with 200 bytes per cell at most: less than a third of what OpenFOAM needs to read the mesh.
 //!
-//! - [`leaves`](crate::leaves): the cells, a walk over them, and their squares; [`faces`](mod@faces): all faces, and the invariants;
-//! - [`Patches`]: the root's sides, the body or its solids, and the cut; [`files`](mod@files): OpenFOAM's syntax.
+//! - `leaves`: the cells, a walk over them, and their squares; `faces`(mod@faces): all faces, and the invariants;
+//! - [`Patches`]: the root's sides, the body or its solids, and the cut; `files`(mod@files): OpenFOAM's syntax.
 
 mod faces;
 mod files;
@@ -50,7 +50,7 @@ pub struct Mesh {
 /// If the mesh cannot be read, if the directory exists and is not empty, if a file cannot be written, or if the options contradict the mesh.
 ///
 /// # Panics
-/// If an invariant of the answer is violated: see [`Faces::check_invariants`].
+/// If an invariant of the answer is violated: see `Faces::check_invariants`.
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     require_new(path)?;
     let of_mesh = read(export)?;
@@ -191,7 +191,7 @@ const BODY: &str = "body";
 /// Patch of the faces beyond which there is a leaf that is not exported.
 const CUT: &str = "cut";
 
-/// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
+/// The patches: `SIDES`, the solids of the body, and, if leaves were left out, the cut.
 pub struct Patches {
     /// The names, unique.
     pub names: Vec<String>,

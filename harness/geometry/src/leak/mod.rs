@@ -1,8 +1,8 @@
 //! Leaks: does a path of free leaves of the base tree join two places, how wide is it, and at which spacing does it
 //! close? Ends of paths are points of the user in free leaves, places in the regions that leaked, or seeds.
 //!
-//! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
-//! - [`report`]: the answer as data and for a terminal; [`invariants`]: what it satisfies.
+//! - `space`: the cells of a base tree and the widest path through them; `passage`: its width, to 5 %;
+//! - [`report`]: the answer as data and for a terminal; `invariants`: what it satisfies.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
 //! narrower of the two passes from one to the other, so an opening that joins leaves of edge e is at least e wide. An

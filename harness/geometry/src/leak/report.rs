@@ -1,6 +1,6 @@
 //! The answer as data, as JSON of the schema `octree-leak/4` when serialised, and for a terminal. Lengths are in the user's units.
 //!
-//! Its invariants are in [`super::invariants`].
+//! Its invariants are in `super::invariants`.
 
 use super::Target;
 use contract::lattice::Root;

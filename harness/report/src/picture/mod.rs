@@ -28,7 +28,7 @@ type Planar = [f64; 2];
 
 /// What a picture shows.
 pub struct Request<'a> {
-    /// The leaves. Without a slice, that of [`middle`] is taken; the window is that of the clip box, if there is one.
+    /// The leaves. Without a slice, the middle one is taken; the window is that of the clip box, if there is one.
     pub selection: Selection,
     /// The body whose section is drawn, if it is known.
     pub body: Option<&'a [Facet]>,

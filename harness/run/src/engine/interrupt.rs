@@ -1,7 +1,7 @@
 //! Signals: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
 //!
 //! Invariants:
-//! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than [`GRACE`];
+//! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than `GRACE`;
 //! - after that time, or at a second signal, child processes are ended, unfinished files and temporary directories are removed, and
 //!   the harness exits with code 130. Temporary directories are below one that this process has made, or staged beside their final
 //!   place ([`contract::files::Staging`]);

@@ -1,9 +1,9 @@
 //! Runs child processes under a time limit, and classifies how they end.
 //!
 //! Invariants:
-//! - when [`run`] returns, no process of the child's [`Session`] is left, however the child ended;
+//! - when [`run`] returns, no process of the child's `Session` is left, however the child ended;
 //! - the child's output goes to files, so that no pipe can fill and no output is lost with a hang; a child that prints more than
-//!   [`OUTPUT_MAX`] is ended, so that the disk cannot fill either.
+//!   `OUTPUT_MAX` is ended, so that the disk cannot fill either.
 
 use super::failure::{End, Failure};
 use super::interrupt;
@@ -100,7 +100,7 @@ pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     to_its_end(command, watch).map_err(|end| Failure::new(watch.name, end))
 }
 
-/// What a program prints that answers at once; none if it fails, or takes longer than [`QUERY`]. The output goes through a pipe: git does
+/// What a program prints that answers at once; none if it fails, or takes longer than `QUERY`. The output goes through a pipe: git does
 /// not repeat a write to a file that a signal interrupts.
 pub fn printed(command: &mut Command) -> Option<String> {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
