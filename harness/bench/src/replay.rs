@@ -7,7 +7,7 @@
 use crate::experiments::entry::{Line, Run};
 use crate::experiments::group::{Group, Groups};
 use crate::study::judge::of_last_origin;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::number::duration;
 use serde::Serialize;
 use statistics::Median;
@@ -72,7 +72,7 @@ impl Expected {
     ///
     /// # Errors
     /// If it has no run.
-    pub fn of(lines: &[Line]) -> Result<Self, Failure> {
+    pub fn of(lines: &[Line]) -> Result<Self> {
         let lines = of_last_origin(lines);
         let groups = Groups::of(&lines);
         if groups.all.is_empty() {
@@ -96,7 +96,7 @@ impl Expected {
     ///
     /// # Errors
     /// If one repetition takes longer.
-    pub fn repeats_within(&self, limit_s: f64) -> Result<Option<u16>, Failure> {
+    pub fn repeats_within(&self, limit_s: f64) -> Result<Option<u16>> {
         if self.seconds <= limit_s {
             return Ok(None);
         }

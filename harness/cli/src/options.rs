@@ -2,7 +2,7 @@
 
 use clap::Args;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::manifest::Sides;
 use contract::mesh::Mesh;
@@ -52,7 +52,7 @@ fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
 ///
 /// # Errors
 /// If it cannot be read.
-pub fn read_case(name: &str) -> Result<Case, Failure> {
+pub fn read_case(name: &str) -> Result<Case> {
     Case::read(&Paths::find().catalogue.case_file(name, Path::new(""))?)
 }
 
@@ -109,7 +109,7 @@ impl SelectionArguments {
     ///
     /// # Errors
     /// If no leaf of such a mesh can satisfy a condition, or if its ranks are needed and it cannot be read.
-    pub fn of(&self, mesh: &Mesh) -> Result<Selection, Failure> {
+    pub fn of(&self, mesh: &Mesh) -> Result<Selection> {
         let Self { clip, level_max, side, rank, slice } = *self;
         let (root, ranks) = (&mesh.manifest.root, mesh.parts.len());
         if let Some(rank) = rank {
@@ -163,7 +163,7 @@ impl MeshArguments {
     ///
     /// # Errors
     /// If the case cannot be read or meshed.
-    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>), Failure> {
+    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>)> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
             let EngineArguments { engine, programs } = &self.engine;

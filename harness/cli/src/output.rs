@@ -1,7 +1,7 @@
 //! Outputs: files, and printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
-use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT, Failure, exit_first};
+use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT, Failure, Result, exit_first};
 use contract::files::write_atomically;
 use files::{message, plain};
 use std::env;
@@ -59,7 +59,7 @@ pub fn finish(code: u8) -> u8 {
 ///
 /// # Errors
 /// The file's name and the reason.
-pub fn put(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+pub fn put(path: &Path, content: impl AsRef<[u8]>) -> Result<()> {
     let make = || {
         path.parent().map_or(Ok(()), create_dir_all)?;
         write_atomically(path, |out| out.write_all(content.as_ref()))
@@ -83,8 +83,8 @@ pub type Form<'a> = (Option<&'a Path>, &'a dyn Fn() -> String);
 ///
 /// # Errors
 /// If a file cannot be written, with the exit code that comes first.
-pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8, Failure> {
-    let write = || -> Result<(), Failure> {
+pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8> {
+    let write = || -> Result<()> {
         for (file, form) in forms {
             file.map_or(Ok(()), |file| put(file, form()))?;
         }

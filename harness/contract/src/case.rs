@@ -1,6 +1,6 @@
 //! Case files, which describe the input of a mesher (reference/DEFINITION.md, section 10).
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::files;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ impl Case {
     ///
     /// # Errors
     /// If a file cannot be read, or if the case is invalid.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self> {
         let text = files::read_text(path).map_err(|error| Failure::about(path, error))?;
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =

@@ -29,6 +29,9 @@ pub fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
+/// A result, or a [`Failure`].
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
 /// Why a command has no result, or why a file cannot be used: one sentence, or the predicate of one whose subject is the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]

@@ -1,6 +1,6 @@
 //! Reading without waiting, and files that are either complete or absent.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use ::files::Draft;
 use std::fs::{self, File, Permissions};
 use std::io;
@@ -15,10 +15,7 @@ pub use ::files::{append_log, read, read_log, read_text, write_atomically};
 ///
 /// # Errors
 /// If the file cannot be written, or with whatever `fill` returns.
-pub fn fill_atomically(
-    path: &Path,
-    fill: impl FnOnce(&mut File) -> Result<(), Failure>,
-) -> Result<u64, Failure> {
+pub fn fill_atomically(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<u64> {
     let named = |error| Failure::at(path, error);
     let mut draft = Draft::create(path).map_err(named)?;
     fill(&mut draft.file)?;

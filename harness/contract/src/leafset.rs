@@ -2,7 +2,7 @@
 //! directories of any size.
 
 use crate::digest::Digest;
-use crate::failure::{Failure, named};
+use crate::failure::{Failure, Result, named};
 use crate::manifest::{self, Manifest, Part};
 use crate::mesh::{Mesh, part_names};
 use crate::npy::{self, PartFile};
@@ -26,7 +26,7 @@ pub struct LeafSet {
 ///
 /// # Errors
 /// If the directory is not a leaf set.
-pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
+pub fn read(dir: &Path) -> Result<LeafSet> {
     let mesh = Mesh::open(dir)?;
     // A tree is one part.
     let mut parts = vec![Vec::new(); mesh.parts.len() + usize::from(mesh.tree_file.is_some())];
@@ -41,7 +41,7 @@ pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
 ///
 /// # Errors
 /// If the directory or an array cannot be read, or if there is none.
-pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, Failure> {
+pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>> {
     let names = part_names(dir)?;
     let why = Failure::about(dir, "it has neither mesh.json nor an array of leaves");
     Failure::unless(!names.is_empty(), why)?;

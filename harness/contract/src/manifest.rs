@@ -10,7 +10,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::files;
 use crate::htg::Block;
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
@@ -334,7 +334,7 @@ impl Manifest {
     ///
     /// # Errors
     /// If it cannot be read, or does not follow its schema.
-    pub fn read(dir: &Path) -> Result<Self, Failure> {
+    pub fn read(dir: &Path) -> Result<Self> {
         let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
         Failure::unless(!dir.is_file(), format_args!("{} {why}", dir.display()))?;
         let path = dir.join(FILE);

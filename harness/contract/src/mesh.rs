@@ -8,7 +8,7 @@
 
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::htg::{Block, TreeError, TreeFile};
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
@@ -50,19 +50,19 @@ pub struct Leaf {
 }
 
 /// Visits leaves of the part with an index.
-pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Block]) -> Result<(), Failure>;
+pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Block]) -> Result<()>;
 
 /// Visits a leaf; its error ends the traversal.
-pub type Each<'a> = &'a mut dyn FnMut(Leaf) -> Result<(), Failure>;
+pub type Each<'a> = &'a mut dyn FnMut(Leaf) -> Result<()>;
 /// Asks whether to continue; its error ends a visit.
-pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
+pub type Check<'a> = &'a dyn Fn() -> Result<()>;
 
 impl Mesh {
     /// Opens a leaf-set directory.
     ///
     /// # Errors
     /// If the directory is not a leaf set.
-    pub fn open(dir: &Path) -> Result<Self, Failure> {
+    pub fn open(dir: &Path) -> Result<Self> {
         let manifest = Manifest::read(dir)?;
         if manifest.parts.is_empty()
             && let Some(name) = &manifest.hyper_tree_grid
@@ -87,7 +87,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the file is not the tree of a mesh with this root.
-    pub fn of_tree(dir: &Path, name: &str, manifest: &Manifest) -> Result<Self, Failure> {
+    pub fn of_tree(dir: &Path, name: &str, manifest: &Manifest) -> Result<Self> {
         let path = dir.join(name);
         let tree = TreeFile::open(&path).map_err(|why| damaged_tree(&path, &why))?;
         let (found, stated) = (tree.root, manifest.root);
@@ -108,7 +108,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the tree is damaged.
-    pub fn stream(&self, run: &mut dyn FnMut(usize, &[Block]) -> bool) -> Result<(), Failure> {
+    pub fn stream(&self, run: &mut dyn FnMut(usize, &[Block]) -> bool) -> Result<()> {
         if let Some(tree) = &self.tree_file {
             let read = tree.blocks(&mut |blocks| run(0, blocks));
             return read.map_err(|why| damaged_tree(&tree.path, &why));
@@ -125,7 +125,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the words are not those of a linear oct-tree; or the first error of `visit`, which ends the traversal.
-    pub fn visit(&self, visit: Visit<'_>) -> Result<(), Failure> {
+    pub fn visit(&self, visit: Visit<'_>) -> Result<()> {
         let (mut order, mut visited) = (Order::default(), Ok(()));
         self.stream(&mut |part, blocks| {
             let linear = blocks.iter().try_for_each(|block| order.add(block.first));
@@ -149,7 +149,7 @@ impl Mesh {
         check: Check<'_>,
         takes: &dyn Fn(&Octant) -> bool,
         visit: Each<'_>,
-    ) -> Result<(), Failure> {
+    ) -> Result<()> {
         let (mut index, mut digest) = (0u64, Digest::default());
         self.visit(&mut |part, blocks| {
             check()?;
@@ -176,7 +176,7 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
-    pub fn tree(&self) -> Result<Tree, Failure> {
+    pub fn tree(&self) -> Result<Tree> {
         let mut builder = Builder::default();
         self.visit(&mut |_, blocks| {
             if builder.nodes() <= NODES_MAX {
@@ -194,7 +194,7 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::visit`].
-    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, Failure> {
+    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>> {
         let start = word::key_of(octant.corner);
         let keys = start..start + word::span(octant.level);
         let mut found = Vec::new();
@@ -212,7 +212,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the mesh cannot be one of the case.
-    pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
+    pub fn require_case(&self, case: &Case) -> Result<()> {
         let &Manifest { root, lacks_inputs, level_surface, geometry, .. } = &self.manifest;
         let differs = if root != case.root {
             format!("root ({root})")
@@ -233,7 +233,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If they are not.
-    pub fn require_sides(&self) -> Result<(), Failure> {
+    pub fn require_sides(&self) -> Result<()> {
         let why = "the sides of this mesh are unknown, and this needs them: hyper-tree grids and surfaces cannot be written without";
         Failure::unless(self.manifest.sides == Sides::Known, why)
     }
@@ -242,7 +242,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If they are not.
-    pub fn require_ranks(&self) -> Result<(), Failure> {
+    pub fn require_ranks(&self) -> Result<()> {
         let why = "the ranks of a mesh that has only a tree are unknown: mesh with --write words";
         Failure::unless(self.tree_file.is_none(), why)
     }
@@ -254,7 +254,7 @@ fn damaged_tree(path: &Path, why: &TreeError) -> Failure {
 }
 
 /// The names of the arrays of leaves in a directory, in alphabetical order.
-pub(crate) fn part_names(dir: &Path) -> Result<Vec<String>, Failure> {
+pub(crate) fn part_names(dir: &Path) -> Result<Vec<String>> {
     let io = |error| Failure::about(dir, error);
     let mut names = Vec::new();
     for entry in fs::read_dir(dir).map_err(io)? {
@@ -280,7 +280,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// The next word, after an exhausted buffer was refilled; `None` at the end of the part.
-    fn head(&mut self) -> Result<Option<u64>, Failure> {
+    fn head(&mut self) -> Result<Option<u64>> {
         if self.position == self.words.len() {
             let left = (self.file.leaves - self.next).min(CHUNK);
             self.words.resize(left as usize, 0);
@@ -297,7 +297,7 @@ impl Reader<'_> {
 ///
 /// # Errors
 /// If a part cannot be read.
-fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Failure> {
+fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<()> {
     let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
     let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
     let mut heads = BinaryHeap::new();

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 
 /// Longer than any header that the programs write, so that one read suffices.
 const HEADER_BYTES_MAX: u64 = 1 << 16;
@@ -25,7 +25,7 @@ impl PartFile {
     ///
     /// # Errors
     /// If the file cannot be read, or is not a part file.
-    pub fn open(path: &Path) -> Result<Self, Failure> {
+    pub fn open(path: &Path) -> Result<Self> {
         let wrong = |why: String| Failure::input(format!("the part {why}"));
         let unreadable = |error| wrong(Failure::unreadable(error).to_string());
         let file = ::files::open(path).map_err(unreadable)?;
@@ -50,7 +50,7 @@ impl PartFile {
     ///
     /// # Errors
     /// If the file cannot be read, or ends too early.
-    pub fn read_at(&self, first: u64, words: &mut [u64]) -> Result<(), Failure> {
+    pub fn read_at(&self, first: u64, words: &mut [u64]) -> Result<()> {
         let bytes = bytemuck::cast_slice_mut(words);
         let read = self.file.read_exact_at(bytes, self.offset + 8 * first);
         read.map_err(|error| Failure::about(&self.path, Failure::unreadable(error)))
@@ -60,7 +60,7 @@ impl PartFile {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read_all(&self) -> Result<Vec<u64>, Failure> {
+    pub fn read_all(&self) -> Result<Vec<u64>> {
         let leaves = usize::try_from(self.leaves).expect("a part fits the address space");
         let mut words = vec![0; leaves];
         self.read_at(0, &mut words)?;

@@ -6,7 +6,7 @@ use std::path::Path;
 use geometries::Facet;
 use serde::Serialize;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::files;
 
 /// A solid of an STL file.
@@ -33,7 +33,7 @@ pub struct Body {
 ///
 /// # Errors
 /// A sentence that begins with the path, if the file cannot be read, or is not an STL file.
-pub fn read(path: &Path) -> Result<Body, Failure> {
+pub fn read(path: &Path) -> Result<Body> {
     let body = files::read(path).map_err(Failure::unreadable).and_then(|bytes| parse(&bytes));
     body.map_err(|why| Failure::input(format!("{} {why}", path.display())))
 }
@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Result<Body, Failure> {
 ///
 /// # Errors
 /// If they are not an STL file.
-pub fn parse(bytes: &[u8]) -> Result<Body, Failure> {
+pub fn parse(bytes: &[u8]) -> Result<Body> {
     Failure::unless(!bytes.is_empty(), wrong("it is empty"))?;
     let Some(facets) = binary(bytes) else { return ascii(bytes) };
     let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
@@ -95,7 +95,7 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
 }
 
 /// The solids of an ASCII file (reference/DEFINITION.md, section 10).
-fn ascii(bytes: &[u8]) -> Result<Body, Failure> {
+fn ascii(bytes: &[u8]) -> Result<Body> {
     Failure::unless(!bytes.contains(&0), damaged(bytes))?;
     let mut words = words(bytes);
     let mut body = Body::default();
@@ -152,7 +152,7 @@ fn starts_facet<'a>(words: &(impl Iterator<Item = Word<'a>> + Clone), line: usiz
 }
 
 /// A facet after its first word. Its normal is ignored.
-fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Failure> {
+fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet> {
     expect(words, "normal")?;
     if words.take(3).count() < 3 {
         return Err(unexpected("a normal", None));
@@ -175,7 +175,7 @@ fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Failur
 }
 
 /// Takes this word; returns its line.
-fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, Failure> {
+fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize> {
     match words.next() {
         Some((word, line)) if is(word, wanted) => Ok(line),
         other => Err(unexpected(wanted, other)),
@@ -208,7 +208,7 @@ mod tests {
                          vertex 0 1 -2.5e-1\nendloop\nendfacet\n";
     const EXPECTED: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
 
-    fn of(bytes: &[u8]) -> Result<Vec<Facet>, Failure> {
+    fn of(bytes: &[u8]) -> Result<Vec<Facet>> {
         parse(bytes).map(|body| body.facets)
     }
 

@@ -1,6 +1,6 @@
 //! Meshes that other programs wrote are imported as the cells that those programs state; damaged ones are refused.
 
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportedTree, Request, leaf_set};
 use contract::lattice::Root;
@@ -23,7 +23,7 @@ fn root([x, y, z, edge]: [f64; 4]) -> Root {
     Root { origin: [x, y, z], edge }
 }
 
-fn imported(path: &Path, request: &Request) -> Result<LeafSet, Failure> {
+fn imported(path: &Path, request: &Request) -> Result<LeafSet> {
     let cells = match import::guess(path)? {
         Format::LeafWords => import::words::read(path, request)?,
         Format::P4est => import::p4est::read(path, request)?,
@@ -105,7 +105,7 @@ fn the_root_of_a_case_moves_forests_in_the_unit_cube_only() {
     assert!(imported(&sample("brick.p8est"), &given).is_ok());
 }
 
-fn tree(path: &Path) -> Result<Option<ImportedTree>, Failure> {
+fn tree(path: &Path) -> Result<Option<ImportedTree>> {
     ImportedTree::open(path, None, None, None, "test".to_owned())
 }
 

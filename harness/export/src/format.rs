@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::options::{Export, Summary, Write};
 use crate::{foam, front, htg, p8est, vtu};
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::{Staging, fill_atomically};
 
 /// A format of mesh files.
@@ -83,7 +83,7 @@ fn made(
     (name, write): (&str, Write),
     export: &Export<'_>,
     path: &Path,
-) -> Result<Summary, Failure> {
+) -> Result<Summary> {
     let failed = |error: io::Error| Failure::at(path, error);
     let place = Staging::beside(path).map_err(failed)?;
     let (source, file) = (place.path().join(name), place.path().join("made"));
@@ -99,7 +99,7 @@ fn made(
 ///
 /// # Errors
 /// If no format has such names.
-pub fn of(path: &Path) -> Result<&'static Format, Failure> {
+pub fn of(path: &Path) -> Result<&'static Format> {
     let fits = |format: &&Format| match format.ending.strip_prefix('.') {
         Some(extension) => path.extension().is_some_and(|of_path| of_path == extension),
         None => path.ends_with("polyMesh") && path.components().count() > 1,

@@ -7,7 +7,7 @@
 use std::io::BufWriter;
 use std::path::Path;
 
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files;
 use contract::lattice::Root;
 use contract::mesh::Leaf;
@@ -22,7 +22,7 @@ use crate::options::{Export, Summary};
 ///
 /// # Errors
 /// If the sides of the mesh are unknown, no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
-pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let Export { mesh, options, .. } = export;
     mesh.require_sides()?;
     let leaves = export.count()?;

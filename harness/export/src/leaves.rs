@@ -12,7 +12,7 @@
 
 use crate::options::{Export, Options};
 use crate::points::Point;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word;
@@ -21,7 +21,7 @@ use contract::word;
 pub const CUT: u64 = 3;
 
 /// Visits a cell with its number, its octant and its squares; its error ends the walk.
-pub type Visit<'a> = &'a mut dyn FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>;
+pub type Visit<'a> = &'a mut dyn FnMut(u32, &Octant, &[Square]) -> Result<()>;
 
 /// The leaves.
 pub struct Leaves {
@@ -58,10 +58,7 @@ impl Leaves {
     ///
     /// # Errors
     /// If the mesh cannot be read, or if the user interrupts.
-    pub fn read(
-        export: &Export<'_>,
-        takes: &mut dyn FnMut(&Leaf, bool) -> bool,
-    ) -> Result<Self, Failure> {
+    pub fn read(export: &Export<'_>, takes: &mut dyn FnMut(&Leaf, bool) -> bool) -> Result<Self> {
         let mut words = Vec::new();
         export.mesh.leaves(&|| export.options.check(), &|_| true, &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
@@ -136,7 +133,7 @@ impl Leaves {
     ///
     /// # Errors
     /// The first error of `visit`, or the user's interrupt.
-    pub fn walk(&self, options: &Options, visit: Visit) -> Result<(), Failure> {
+    pub fn walk(&self, options: &Options, visit: Visit) -> Result<()> {
         let content = self.content(0, self.words.len(), 0);
         let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
         self.descend(&root, &mut Vec::new(), options, visit)
@@ -148,7 +145,7 @@ impl Leaves {
         squares: &mut Vec<Square>,
         options: &Options,
         visit: Visit,
-    ) -> Result<(), Failure> {
+    ) -> Result<()> {
         if let Content::Cell(number) = around.content {
             options.check_at(u64::from(number))?;
             self.squares(around, squares);

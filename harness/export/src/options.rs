@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Failure, Result, Watch};
 use contract::mesh::{Each, Mesh};
 use contract::octant::Octant;
 use contract::word::{self, KEY_END};
@@ -29,12 +29,12 @@ pub struct Export<'a> {
 
 impl Export<'_> {
     /// Visits the selected leaves in Morton order. All leaves are read once.
-    pub(crate) fn visit(&self, visit: Each<'_>) -> Result<(), Failure> {
+    pub(crate) fn visit(&self, visit: Each<'_>) -> Result<()> {
         self.selection.visit(self.mesh, &|| self.options.check(), visit)
     }
 
     /// Number of selected leaves, which is not 0.
-    pub(crate) fn count(&self) -> Result<u64, Failure> {
+    pub(crate) fn count(&self) -> Result<u64> {
         let mut leaves = 0;
         match self.is_of_all() {
             true => leaves = self.mesh.leaf_count(),
@@ -47,7 +47,7 @@ impl Export<'_> {
     }
 
     /// Refuses an export without leaves.
-    pub(crate) fn require_some(&self, leaves: u64) -> Result<u64, Failure> {
+    pub(crate) fn require_some(&self, leaves: u64) -> Result<u64> {
         Failure::unless(leaves > 0, "no leaf satisfies all conditions, or the mesh has none")?;
         Ok(leaves)
     }
@@ -69,7 +69,7 @@ pub struct Options<'a> {
     /// The regions that are exported to OpenFOAM.
     pub regions: Regions,
     /// Runs the script that makes a file of this format: its source and the file.
-    pub script: fn(&str, &Path, &Path) -> Result<(), Failure>,
+    pub script: fn(&str, &Path, &Path) -> Result<()>,
 }
 
 /// Width of the numbers of cells, faces and points.
@@ -99,7 +99,7 @@ impl Options<'_> {
     ///
     /// # Errors
     /// If the user has interrupted the export.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub fn check(&self) -> Result<()> {
         self.watch.check()
     }
 
@@ -107,7 +107,7 @@ impl Options<'_> {
     ///
     /// # Errors
     /// As [`Self::check`].
-    pub fn check_at(&self, count: u64) -> Result<(), Failure> {
+    pub fn check_at(&self, count: u64) -> Result<()> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
 }
@@ -116,14 +116,14 @@ impl Options<'_> {
 ///
 /// # Errors
 /// If it exists.
-pub(crate) fn require_new(path: &Path) -> Result<(), Failure> {
+pub(crate) fn require_new(path: &Path) -> Result<()> {
     let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
     let why = format!("{} exists: remove it, or choose another name", path.display());
     Failure::unless(!has_content, why)
 }
 
 /// Writes to a path. After an error, nothing exists under a final name.
-pub type Write = fn(&Export<'_>, &Path) -> Result<Summary, Failure>;
+pub type Write = fn(&Export<'_>, &Path) -> Result<Summary>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

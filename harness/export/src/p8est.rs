@@ -10,7 +10,7 @@
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files;
 use contract::import::forest::{ALIGNMENT, FORMAT};
 use contract::import::p4est::FILLER;
@@ -36,7 +36,7 @@ const VERSION: &[u8] = b"2.2";
 /// # Errors
 /// If no leaf is selected, if one is deeper than level 18, if the mesh cannot be read or the file cannot be written, or if
 /// the user interrupts.
-pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let leaves = export.count()?;
     let start = |quadrants: u64| {
         let mut bytes = connectivity(&export.mesh.manifest.root);
@@ -69,10 +69,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.
-fn quadrants(
-    export: &Export<'_>,
-    visit: &mut impl FnMut(Octant, u8) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+fn quadrants(export: &Export<'_>, visit: &mut impl FnMut(Octant, u8) -> Result<()>) -> Result<()> {
     let has_sides = export.mesh.manifest.sides == Sides::Known;
     let mut next = 0;
     export.visit(&mut |Leaf { octant, side, .. }| {

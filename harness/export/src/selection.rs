@@ -1,6 +1,6 @@
 //! Parts of a mesh: which leaves an export contains.
 
-use contract::failure::Failure;
+use contract::failure::Result;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::mesh::{Check, Each, Leaf, Mesh};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
@@ -71,7 +71,7 @@ impl Selection {
     ///
     /// # Errors
     /// As [`Mesh::leaves`].
-    pub fn visit(&self, mesh: &Mesh, check: Check<'_>, visit: Each<'_>) -> Result<(), Failure> {
+    pub fn visit(&self, mesh: &Mesh, check: Check<'_>, visit: Each<'_>) -> Result<()> {
         let mut selected = |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) };
         mesh.leaves(check, &|octant| self.meets(octant), &mut selected)
     }
@@ -85,7 +85,7 @@ mod tests {
     use contract::word;
     use proptest::prelude::*;
 
-    fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>, Failure> {
+    fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>> {
         let mut words = Vec::new();
         selection.visit(mesh, &|| Ok(()), &mut |leaf| {
             words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));

@@ -2,7 +2,7 @@
 
 use crate::options::{Export, Label, Options, Regions};
 use crate::selection::Selection;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Result, Watch};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
@@ -23,7 +23,7 @@ impl Watch for Unwatched {
 }
 
 /// A script that is not expected.
-fn no_script(_: &str, _: &Path, _: &Path) -> Result<(), Failure> {
+fn no_script(_: &str, _: &Path, _: &Path) -> Result<()> {
     unreachable!("no other format asks for it")
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use contract::case::{Case, Facet};
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::manifest::Keep;
 use contract::stl;
@@ -49,7 +49,7 @@ impl Input {
     ///
     /// # Errors
     /// If a file cannot be read or the geometry cannot be meshed.
-    pub fn read(path: &Path, mut requested: Requested) -> Result<Self, Failure> {
+    pub fn read(path: &Path, mut requested: Requested) -> Result<Self> {
         let (facets, solids) = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             let case = Case::read(path)?;
             let cell = case.root.edge_of(case.level_surface);

@@ -9,7 +9,7 @@ use crate::engine::paths::Paths;
 use crate::python;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result};
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportedTree, Position, Request};
 use contract::lattice::Root;
@@ -73,7 +73,7 @@ pub fn import(
     case: Option<&Case>,
     program: String,
     limit: Duration,
-) -> Result<Imported, Failure> {
+) -> Result<Imported> {
     let input = |error: Failure| error.of_file(path);
     let root = request.root.or(case.map(|case| case.root));
     parts(path).iter().try_for_each(|part| files::register_input(part))?;
@@ -127,7 +127,7 @@ fn read(
     request: &Request,
     paths: &Paths,
     limit: Duration,
-) -> Result<Cells, Failure> {
+) -> Result<Cells> {
     let (name, script) = match format {
         Format::LeafWords => return import::words::read(path, request),
         Format::P4est => return import::p4est::read(path, request),
@@ -163,7 +163,7 @@ fn read(
 }
 
 /// The cells of rows of numbers: corner, edge, and level and side if they are known.
-fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Failure> {
+fn cells(bytes: &[u8], stated: Stated) -> Result<Cells> {
     let Stated { root, has_levels, has_sides, digest } = stated;
     let (numbers, _) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
@@ -272,7 +272,7 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
 
     /// Reads a file with a shell script instead of Python, which gets the table's path as $4 and the request as $5.
-    fn read_with(script: &str, sides: Option<&str>) -> Result<Cells, Failure> {
+    fn read_with(script: &str, sides: Option<&str>) -> Result<Cells> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
         fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();

@@ -11,7 +11,7 @@
 
 use crate::read_toml;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::plain::PlainCase;
 use std::fs::{self, File};
@@ -41,7 +41,7 @@ impl Base {
     ///
     /// # Errors
     /// If the case is invalid, it has no generator for other facets, or the directory cannot be written.
-    pub fn read(path: &Path, per_rank: Option<[usize; 2]>, place: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path, per_rank: Option<[usize; 2]>, place: &Path) -> Result<Self> {
         let mut case = Case::read(path)?;
         let mut table = PlainCase::read(path)?.table;
         let (mut name, mut stem) = (case.name.clone(), case.name.clone());
@@ -85,7 +85,7 @@ impl Base {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self, spacing_min: f64, n: u32, in_own_root: bool) -> Result<PathBuf, Failure> {
+    pub fn write(&self, spacing_min: f64, n: u32, in_own_root: bool) -> Result<PathBuf> {
         let root = if in_own_root { self.root } else { fitted(self.root, spacing_min) };
         let mut table = self.table.clone();
         table.insert("spacing_min".into(), spacing_min.into());

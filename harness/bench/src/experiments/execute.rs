@@ -5,7 +5,7 @@ use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
 use super::machine;
 use check::audit::audit_against;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use run::engine::description::is_own;
 use run::engine::layout::{Launcher, Layout, Ranks, RunOptions, node_count};
 use run::engine::report::PhaseReport;
@@ -40,7 +40,7 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// If the run gives no result, or the mesh breaks a promise.
-    pub fn run(&self, setup: &Setup, case: &Path, repeat: Option<usize>) -> Result<Run, Failure> {
+    pub fn run(&self, setup: &Setup, case: &Path, repeat: Option<usize>) -> Result<Run> {
         let engine = self.programs.named(&setup.engine).with_launcher(self.launcher.clone());
         let written = repeat.is_none() && !is_own(engine.name());
         let checked = written && !engine.description.promises.definition;

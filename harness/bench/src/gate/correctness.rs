@@ -8,7 +8,7 @@ use super::measures::LayerName;
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::GateCase;
 use check::checks::CHECKS as CHECKS_OF_MESHES;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use run::engine::runner::{Engine, Programs};
 use run::verify::options::Options;
 use run::verify::report::{CaseReport, Check, Outcome, RUNS};
@@ -20,7 +20,7 @@ use std::cmp::Ordering;
 ///
 /// # Errors
 /// If verification cannot start.
-pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
+pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<()> {
     for case in bench.cases_of(LayerName::Correctness) {
         let report = verified(bench, &bench.candidate.engine, case)?;
         let is_plain = report.checks.iter().all(|check| !check.failed() && !is_unchecked(check));
@@ -36,7 +36,7 @@ pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
 }
 
 /// Verifies a program on a case.
-fn verified(bench: &Bench, engine: &Engine, case: &GateCase) -> Result<CaseReport, Failure> {
+fn verified(bench: &Bench, engine: &Engine, case: &GateCase) -> Result<CaseReport> {
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
     let options = Options {
         timeout: bench.options.timeout,

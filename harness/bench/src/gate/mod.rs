@@ -19,7 +19,7 @@ use crate::emptied;
 use crate::experiments::machine;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use contract::failure::Failure;
+use contract::failure::Result;
 use measures::{LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
 use rules::GateCase;
@@ -85,7 +85,7 @@ struct Bench<'a> {
 ///
 /// # Errors
 /// If the gate cannot start; later failures are in the report.
-pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Failure> {
+pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
     let start = Instant::now();
     let default = programs.paths.root.join("harness/engines/gate.toml");
     let rules = Rules::read(options.rules.as_deref().unwrap_or(&default))?;
@@ -109,7 +109,7 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Fa
     Ok(report)
 }
 
-fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
+fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
     // Without a choice of layers, those are requested for which the rules have a case.
     let requested = |name: &LayerName| match bench.options.layers.is_empty() {
         true => bench.asked(*name).next().is_some(),

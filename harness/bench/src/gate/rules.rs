@@ -3,7 +3,7 @@
 use super::measures::LayerName;
 use crate::{read_toml, refuse};
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use run::engine::layout::Ranks;
 use run::engine::runner::Programs;
 use serde::Deserialize;
@@ -110,7 +110,7 @@ impl GateCase {
     }
 
     /// Finds what this machine and an engine lack to run it; ranks that the engine cannot simulate become ranks on MPI.
-    fn find(mut self, programs: &Programs) -> Result<Self, Failure> {
+    fn find(mut self, programs: &Programs) -> Result<Self> {
         if self.file.as_os_str().is_empty() {
             let found = programs.paths.catalogue.named(&self.name)?;
             (self.file, self.absent) = (found.path, found.absent);
@@ -142,7 +142,7 @@ impl Rules {
     ///
     /// # Errors
     /// If the file is missing or invalid.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self> {
         let mut rules: Self = read_toml(path)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         for case in rules.cases.iter_mut().filter(|case| case.name.ends_with(".toml")) {
@@ -188,7 +188,7 @@ impl Rules {
     ///
     /// # Errors
     /// If a name is missing from the rules or the catalogue, or a case cannot be read.
-    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<GateCase>, Failure> {
+    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<GateCase>> {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
             let known = known.join(", ");

@@ -10,7 +10,7 @@ use super::GateOptions;
 use super::measures::{CaseMeasures, Measured};
 use crate::experiments::machine::{compiler, digest_of};
 use crate::git;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use run::engine::description::Build;
 use run::engine::failure::Failure as Ended;
 use run::engine::process::{self, Watch};
@@ -44,7 +44,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self, Failure> {
+    fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self> {
         engine.require()?;
         let program = digest_of(engine.files());
         let measured = Measured { named, revision, program };
@@ -60,7 +60,7 @@ impl Subject {
         options: &GateOptions,
         engine: &Engine,
         baseline: Option<&Self>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
         let own = engine.program.to_string_lossy();
         let default = if is_built && !engine.is_given { WORKING_TREE } else { &own };
@@ -77,7 +77,7 @@ impl Subject {
     ///
     /// # Errors
     /// If it is neither, or does not build.
-    pub fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
+    pub fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self> {
         let description = &engine.description;
         if Path::new(named).is_file() {
             let mode = fs::metadata(named)?.permissions().mode();
@@ -106,7 +106,7 @@ impl Subject {
 }
 
 /// Returns the program of a revision, built unless an earlier gate has kept it, or that of the repository's working tree.
-fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf, Failure> {
+fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf> {
     let cache = repository.join("target/gate");
     let place = cache.join(revision.unwrap_or("working-tree"));
     let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));

@@ -9,7 +9,7 @@
 pub mod probe;
 pub mod reduce;
 
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::Staging;
 use contract::plain::StlForm;
 use probe::{Fault, Judged, Trial};
@@ -54,7 +54,7 @@ impl Shrunk {
 ///
 /// # Errors
 /// If the check is not among those that were run.
-pub fn fault(judged: &[Judged], check: Option<&str>) -> Result<Option<Fault>, Failure> {
+pub fn fault(judged: &[Judged], check: Option<&str>) -> Result<Option<Fault>> {
     let mut of_name = judged.iter().filter(|one| check.is_none_or(|name| one.0 == name)).peekable();
     if let (Some(name), None) = (check, of_name.peek()) {
         let ran = judged.iter().map(|one| one.0).collect::<Vec<_>>().join(", ");
@@ -72,12 +72,12 @@ pub fn shrink(
     given: Trial,
     first: &Fault,
     limit: Duration,
-    judge: impl Fn(&Trial) -> Result<Vec<Judged>, Failure>,
-) -> Result<Shrunk, Failure> {
+    judge: impl Fn(&Trial) -> Result<Vec<Judged>>,
+) -> Result<Shrunk> {
     let start = Instant::now();
     let mut trials = 1;
     let is_over = || start.elapsed() >= limit || interrupt::requested();
-    let same = |trial: &Trial| -> Result<Option<Fault>, Failure> {
+    let same = |trial: &Trial| -> Result<Option<Fault>> {
         let mut faults = judge(trial)?.into_iter().filter_map(|one| one.1);
         Ok(faults.find(|fault| fault.is_same_as(first)))
     };

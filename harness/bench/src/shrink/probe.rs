@@ -5,7 +5,7 @@ use crate::emptied;
 use check::checks::{self, CheckResult, Outcome, Subject, identical};
 use check::promises::Independence;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::leafset::LeafSet;
 use contract::manifest::Tree;
 use contract::plain::PlainCase;
@@ -81,7 +81,7 @@ impl Probe {
     ///
     /// # Errors
     /// If no directory for runs can be created.
-    pub fn new(engine: Engine, reference: Engine, limit: Duration) -> Result<Self, Failure> {
+    pub fn new(engine: Engine, reference: Engine, limit: Duration) -> Result<Self> {
         let place = tempfile::Builder::new().prefix("harness-shrink-").tempdir()?;
         Ok(Self { engine, reference, limit, place })
     }
@@ -92,7 +92,7 @@ impl Probe {
     ///
     /// # Errors
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
-    pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, Failure> {
+    pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
         let Description { takes, promises, .. } = &self.engine.description;
         let path = trial.case.write(self.place.path(), takes.stl)?;
@@ -140,12 +140,7 @@ impl Probe {
     }
 
     /// The checks of the engine's promises, and a second run if it is promised to be the same.
-    fn promised(
-        &self,
-        path: &Path,
-        ranks: Ranks,
-        subject: Subject,
-    ) -> Result<Vec<CheckResult>, Failure> {
+    fn promised(&self, path: &Path, ranks: Ranks, subject: Subject) -> Result<Vec<CheckResult>> {
         let promises = &self.engine.description.promises;
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
@@ -170,7 +165,7 @@ impl Probe {
 }
 
 /// A run without a mesh as a failed check.
-fn failed_run(failure: Ended, ranks: Ranks) -> Result<Fault, Failure> {
+fn failed_run(failure: Ended, ranks: Ranks) -> Result<Fault> {
     let end = match &failure.end {
         End::Missing(_) | End::Interrupted => return Err(Failure::input(failure)),
         End::TimedOut { .. } => "hangs".to_owned(),

@@ -2,7 +2,7 @@
 
 use super::Study;
 use crate::read_toml;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
 use run::engine::paths::Paths;
 use run::engine::runner::Engine;
@@ -18,7 +18,7 @@ pub const STUDY: &str = "study.toml";
 ///
 /// # Errors
 /// If the study is invalid, a file cannot be read or written, or two files have one name.
-pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
+pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<()> {
     let directory = Study::read(study)?.directory;
     let mut table: Table = read_toml(study)?;
     for (key, value) in &mut table {
@@ -54,7 +54,7 @@ pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
 }
 
 /// Copies an engine file with the program and the scripts beside it. What it runs from elsewhere is of the machine.
-fn copy_engine(path: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
+fn copy_engine(path: &Path, paths: &Paths, out: &Path) -> Result<()> {
     copy(path, &out.join(file_name(path)))?;
     let engine = Engine::find(&path.to_string_lossy(), None, paths)?;
     for file in engine.files() {
@@ -75,13 +75,13 @@ fn file_name(path: &Path) -> String {
 ///
 /// # Errors
 /// If it cannot be read or written, or the place has another file.
-pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
     let bytes = files::read(from).map_err(|error| Failure::at(from, error))?;
     put(to, &bytes)
 }
 
 /// Writes a file unless it is there.
-fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
     match fs::read(path) {
         Ok(before) if before == bytes => return Ok(()),
         Ok(_) => return Err(Failure::about(path, "two files have this name: rename one")),

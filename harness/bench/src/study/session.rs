@@ -15,7 +15,7 @@ use crate::experiments::{machine, network};
 use crate::{jsonl, name_of};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Failure, Result, Watch};
 use run::engine::interrupt;
 use run::engine::layout::Launcher;
 use run::engine::runner::Programs;
@@ -95,7 +95,7 @@ pub fn measure(
     study: &Study,
     programs: &Programs,
     progress: &dyn Fn(&str),
-) -> Result<Outcome, Failure> {
+) -> Result<Outcome> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir()?;
     let (launcher, limit) = (&options.launcher, options.timeout);
     let mut session = Session {
@@ -154,7 +154,7 @@ struct Session<'a> {
 
 impl Session<'_> {
     /// Executes the series and the rows, which are added as soon as they are judged.
-    fn all(&mut self, rows: &mut Vec<Judged>) -> Result<(), Failure> {
+    fn all(&mut self, rows: &mut Vec<Judged>) -> Result<()> {
         self.open()?;
         let study = self.study;
         for series in &study.series {
@@ -176,7 +176,7 @@ impl Session<'_> {
     }
 
     /// Records the circumstances.
-    fn open(&mut self) -> Result<(), Failure> {
+    fn open(&mut self) -> Result<()> {
         let programs = self.runner.programs;
         let lacks = |name: String| (name.clone(), programs.named(&name).description.lacks());
         let opening = Opening {
@@ -190,7 +190,7 @@ impl Session<'_> {
         self.options.network.map_or(Ok(()), |given| self.append(Entry::Network(given)))
     }
 
-    fn append(&mut self, entry: Entry) -> Result<(), Failure> {
+    fn append(&mut self, entry: Entry) -> Result<()> {
         let line = Line::new(&self.name, entry);
         let appended = jsonl::append(self.record, &line);
         self.lines.push(line);
@@ -206,7 +206,7 @@ impl Session<'_> {
     }
 
     /// Plans the runs of a series at one size.
-    fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>, Failure> {
+    fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>> {
         use Experiment::{Spacing, Strong, Weak, Weights};
         let (experiment, named) = (series.experiment, name_of(&series.experiment));
         let mut base = self.base(&series.case, None)?;
@@ -261,7 +261,7 @@ impl Session<'_> {
     }
 
     /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
-    fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64, Failure> {
+    fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64> {
         let sizes = self.sizes.entry((base.stem.clone(), n)).or_default();
         sizes.spacing(cells, base.coarse(), |spacing| {
             let case = base.write(spacing, n, false)?;
@@ -271,7 +271,7 @@ impl Session<'_> {
     }
 
     /// Plans the run of this name, and writes its case.
-    fn of_run(&mut self, name: &str) -> Result<Planned, Failure> {
+    fn of_run(&mut self, name: &str) -> Result<Planned> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
         let base = self.base(&mesh.case, None)?;
@@ -290,7 +290,7 @@ impl Session<'_> {
     }
 
     /// Returns a case, with facets for each of some ranks if they are given; writes its geometry as a binary STL file, once.
-    fn base(&mut self, case: &str, per_rank: Option<[usize; 2]>) -> Result<Base, Failure> {
+    fn base(&mut self, case: &str, per_rank: Option<[usize; 2]>) -> Result<Base> {
         let key = (case.to_owned(), per_rank);
         if let Some(known) = self.bases.get(&key) {
             return Ok(known.clone());
@@ -304,7 +304,7 @@ impl Session<'_> {
     }
 
     /// Executes the runs of a row that are not complete, and judges it.
-    fn row(&mut self, row: &Row) -> Result<Judged, Failure> {
+    fn row(&mut self, row: &Row) -> Result<Judged> {
         let study = self.study;
         let mut points = Vec::new();
         for name in row.runs() {
@@ -331,7 +331,7 @@ impl Session<'_> {
 
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
     /// a mesh, or would exceed the time or the memory, is not run on it.
-    fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
+    fn make(&mut self, points: &mut [Planned]) -> Result<()> {
         let is_known = self.lines.iter().any(|line| line.network().is_some());
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
             self.measure_network()?;
@@ -374,7 +374,7 @@ impl Session<'_> {
     }
 
     /// Records the cost of messages, on which all projections depend.
-    fn measure_network(&mut self) -> Result<(), Failure> {
+    fn measure_network(&mut self) -> Result<()> {
         let network = match network::measured(&self.runner) {
             Ok(network) => network,
             Err(_) if interrupt::requested() => return Err(Failure::interrupted()),
@@ -387,7 +387,7 @@ impl Session<'_> {
     }
 
     /// Runs a point and records the result.
-    fn run(&mut self, point: &mut Planned, repeat: Option<usize>) -> Result<(), Failure> {
+    fn run(&mut self, point: &mut Planned, repeat: Option<usize>) -> Result<()> {
         let s = &point.setup;
         let which = repeat.map_or("warm-up".to_owned(), |number| format!("repeat {}", number + 1));
         (self.progress)(&format!("{s}, {which}"));
@@ -406,7 +406,7 @@ impl Session<'_> {
 
     /// Requires runs that must have the same mesh to report the same: the time of a wrong mesh is not a result. The mesh of an
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
-    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), Failure> {
+    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<()> {
         let engine = self.runner.programs.named(&point.setup.engine);
         let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {

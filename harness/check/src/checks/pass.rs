@@ -6,7 +6,7 @@
 use super::identical::Named;
 use super::{Check, CheckResult};
 use contract::digest::Digest;
-use contract::failure::Failure;
+use contract::failure::Result;
 use contract::htg::Block;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Part, octant_index};
@@ -28,7 +28,7 @@ impl Pass {
     ///
     /// # Errors
     /// If a part or the tree cannot be read.
-    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, Failure> {
+    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self> {
         let mut state = State::new(&mesh.manifest, nodes_max);
         mesh.stream(&mut |part, run| {
             state.count(part, run);

@@ -14,7 +14,7 @@ use crate::checks::manifest::{differing, differing_inputs};
 
 use crate::why;
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::Result;
 use contract::htg::Block;
 use contract::manifest::{Manifest, Sides};
 use contract::mesh::Mesh;
@@ -72,7 +72,7 @@ impl fmt::Display for DiffReport {
 ///
 /// # Errors
 /// If a directory cannot be read.
-pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failure> {
+pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport> {
     let [mut a, mut b] = [Mesh::open(a)?, Mesh::open(b)?];
     let unknown = |(_, mesh): &(&str, &Mesh)| mesh.manifest.sides == Sides::Unknown;
     let without_sides = [("A", &a), ("B", &b)].into_iter().find(unknown).map(|(name, _)| name);

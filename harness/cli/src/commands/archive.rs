@@ -9,7 +9,7 @@ use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::package::{self, copy, package};
 use bench::study::{SessionOptions, Study};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result};
 use contract::files::{Staging, nearest_directory};
 use report::archive::{About, EXPECTED, METADATA, RECORD, STUDY, metadata, readme};
 use report::pretty;
@@ -39,7 +39,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { report, study, out, about } = arguments;
     let shown = out.display();
     Failure::unless(!out.exists(), format!("{shown} exists: name another directory"))?;
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// The paths of the files in a directory and those in it. A link to a directory, which may lead in a circle, counts as a file.
-fn list(directory: &Path) -> Result<Vec<String>, Failure> {
+fn list(directory: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in WalkDir::new(directory).min_depth(1) {
         let entry = entry.map_err(|error| Failure::at(directory, error.into()))?;
@@ -131,7 +131,7 @@ pub struct ReplayArguments {
 ///
 /// # Errors
 /// If the archive cannot be read, a program is missing, or the time does not suffice for one repetition.
-pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
+pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     let ReplayArguments { archive, record, session, .. } = arguments;
     let lines = read(&[archive.join(RECORD)])?;
     let expected = Expected::of(&lines)?;
@@ -174,7 +174,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
 }
 
 /// Removes the programs of others that are not installed here, and says so.
-fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
+fn leave_out_missing(study: &mut Study) -> Result<()> {
     let paths = Paths::find();
     for name in study.engines().iter().filter(|name| !is_own(name)) {
         if !Engine::find(name, None, &paths).is_ok_and(|engine| engine.require().is_ok()) {

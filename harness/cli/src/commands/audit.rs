@@ -6,7 +6,7 @@ use check::audit::{AuditReport, audit_against};
 use check::forest;
 use check::promises::{Promises, Touching};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, exit_first};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, Result, exit_first};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::verify::others::proven;
@@ -47,7 +47,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the mesh cannot be read, or the engine does not support the case.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { mesh, promises, balance, proved, source, .. } = arguments;
     let start = Instant::now();
     if promises.is_none()
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Prints the report, and writes it if that is asked for; returns the exit code.
-fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8, Failure> {
+fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8> {
     report.check_invariants();
     println!("{report}");
     if let Some(path) = &arguments.json {

@@ -8,7 +8,7 @@ use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
 use clap::Args;
 use contract::failure::{
-    EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, exit_first,
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result, exit_first,
 };
 use report::benchmark::tables;
 use report::table::{Table, escaped};
@@ -53,7 +53,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the study or the record is invalid, a program is missing, or a report cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let (study, report) = (read(arguments)?, arguments.report.as_deref());
     let in_report = report.map(|directory| directory.join("record.jsonl"));
     let record = arguments.record.clone().or(in_report);
@@ -90,7 +90,7 @@ fn read(arguments: &Arguments) -> Result<Study, String> {
     Ok(study)
 }
 
-fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8, Failure> {
+fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8> {
     if let Some(directory) = &arguments.report {
         // A report that could not be written is refused before the runs.
         fs::create_dir_all(directory).map_err(|error| Failure::at(directory, error))?;
@@ -113,7 +113,7 @@ pub(super) fn execute(
     record: &Path,
     study: &mut Study,
     given: &Given,
-) -> Result<Outcome, Failure> {
+) -> Result<Outcome> {
     let programs = programs(given, study)?;
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
@@ -123,7 +123,7 @@ pub(super) fn execute(
 }
 
 /// Finds the programs, and replaces the names in the series by those of the results.
-fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
+fn programs(given: &Given, study: &mut Study) -> Result<Programs> {
     let names = study.engines();
     let is_one = names.len() <= 1 || given.mesher.is_none();
     Failure::unless(is_one, "--mesher replaces the program of one engine: name one")?;
@@ -150,12 +150,7 @@ fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
 
 /// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given; returns the exit
 /// code.
-fn publish(
-    study: &Study,
-    rows: &[Judged],
-    lines: &[Line],
-    report: Option<&Path>,
-) -> Result<u8, Failure> {
+fn publish(study: &Study, rows: &[Judged], lines: &[Line], report: Option<&Path>) -> Result<u8> {
     if !study.series.is_empty() {
         print!("{}", tables::text(&Groups::of(lines)));
         print_without(lines);

@@ -5,7 +5,7 @@ use crate::options::{Input, examples};
 use check::checks::CheckResult;
 use check::{diff, forest};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 
 /// `harness diff`.
 #[derive(Args, Debug)]
@@ -27,7 +27,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If a mesh or the case cannot be read.
-pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8, Failure> {
+pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8> {
     source.refuse_unused(&[a, b])?;
     if let [Some(a), Some(b)] = [source.forest(a)?, source.forest(b)?]
         && !(*ignore_root || a.is_one_cube() && b.is_one_cube())

@@ -2,7 +2,7 @@
 
 use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_HOLDS, Failure, Result};
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS};
 use export::options::{Export, Label, Options, Regions, Summary};
@@ -47,7 +47,7 @@ fn after_help() -> String {
 ///
 /// # Errors
 /// If the mesh cannot be read, or the file cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { mesh, file, case, label, regions, selection } = arguments;
     let format = format::of(file)?;
     let given = [
@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Makes a file of a format of what the format is made of, in a temporary directory.
-fn script(format: &str, source: &Path, file: &Path) -> Result<(), Failure> {
+fn script(format: &str, source: &Path, file: &Path) -> Result<()> {
     let place = source.parent().expect("the source is in a temporary directory");
     let (name, script) = (format.to_uppercase(), format!("export_{format}.py"));
     python::run(&name, &script, [source, file], &Paths::find(), SCRIPT_LIMIT, place)?;

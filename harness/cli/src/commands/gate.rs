@@ -5,7 +5,7 @@ use crate::output::put_forms;
 use bench::gate::report::End;
 use bench::gate::{GateOptions, gate};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Result};
 use report::gate::{junit, markdown, text};
 use report::pretty;
 
@@ -35,7 +35,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the gate cannot start, or a report cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let report = gate(&arguments.options, &arguments.engine.find()?)?;
     print!("{}", text(&report));
     let code = match report.end() {

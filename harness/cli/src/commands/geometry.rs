@@ -3,7 +3,7 @@
 use crate::options::{self, Output, examples, root};
 use crate::output::put;
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Result};
 use contract::lattice::Root;
 use geometry::diagnose;
 use geometry::input::{Input, Requested};
@@ -37,7 +37,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the geometry cannot be meshed, or the file cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
     let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
     let input = Input::read(&arguments.file, requested)?;

@@ -3,7 +3,7 @@
 use crate::options::{Input, Meshed, examples, read_case, root, whole_seconds};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_HOLDS, Failure, Result};
 use contract::import::forest::{self, Forest};
 use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
@@ -54,7 +54,7 @@ impl Source {
     ///
     /// # Errors
     /// If any is given.
-    pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<(), Failure> {
+    pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
         let Self { format, root, case: _, sides, position, timeout: _ } = self;
         let is_given = format.is_some()
             || root.is_some()
@@ -69,7 +69,7 @@ impl Source {
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>, Failure> {
+    pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>> {
         let Self { format, root, case, sides, .. } = self;
         let is_one_mesh = root.is_some() || case.is_some() || sides.is_some();
         if is_one_mesh || format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
@@ -82,12 +82,12 @@ impl Source {
     ///
     /// # Errors
     /// If it is not in the catalogue, or is invalid.
-    pub fn read_case(&self) -> Result<Option<Case>, Failure> {
+    pub fn read_case(&self) -> Result<Option<Case>> {
         self.case.as_deref().map(read_case).transpose()
     }
 
     /// Reads the mesh.
-    fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
+    fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported> {
         let Self { format, root, position, timeout, .. } = *self;
         let sides = self.sides.clone();
         let request = Request { sides, root, position, ..Request::default() };
@@ -106,7 +106,7 @@ impl Source {
     ///
     /// # Errors
     /// If it is not a usable mesh, or if Python or VTK is missing.
-    pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Meshed, Failure> {
+    pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Meshed> {
         if has_manifest(mesh) {
             return Ok(Meshed { dir: mesh.to_owned(), made: None });
         }
@@ -124,7 +124,7 @@ fn has_manifest(mesh: &Path) -> bool {
 ///
 /// # Errors
 /// If the mesh cannot be read or written.
-pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
+pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8> {
     let case = source.read_case()?;
     let mut imported = source.read(mesh, case.as_ref())?;
     imported.create(out, false)?;

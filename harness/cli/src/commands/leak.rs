@@ -4,7 +4,7 @@ use crate::options::{Output, examples, point, whole_seconds};
 use crate::output::put;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Watch};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result, Watch};
 use contract::files::write_atomically;
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
@@ -51,7 +51,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the case cannot be read or meshed, or a file cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let is_vtp = |file: &Output| file.extension().is_some_and(|extension| extension == "vtp");
     let is_named = arguments.vtk.as_ref().is_none_or(is_vtp);
     Failure::unless(is_named, "the file name of --vtk must end in .vtp")?;
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let case = Case::read(&path)?;
     let place = tempfile::tempdir()?;
     let plain = PlainCase::read(&path)?;
-    let tree = |level: u8| -> Result<LeafSet, Failure> {
+    let tree = |level: u8| -> Result<LeafSet> {
         let mut plain = plain.clone();
         if level != case.level_surface {
             // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             let regions = leaks.regions(&leaked)?.into_iter();
             // Seeds lie in the flow, into which the region leaked.
             let seed = |from| Ok((from, leaks.seed(Target::Point(from))?));
-            let ends = regions.map(seed).collect::<Result<Vec<_>, Failure>>()?.into_iter();
+            let ends = regions.map(seed).collect::<Result<Vec<_>>>()?.into_iter();
             ends.map(|(from, seed)| (from, seed.map_or(Target::Far, Target::Point))).collect()
         }
     };
@@ -138,7 +138,7 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
 }
 
 /// Writes the requested files, unless the user has interrupted.
-fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
+fn write(arguments: &Arguments, answers: &Answers) -> Result<()> {
     let passages: Vec<&Passage> =
         answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
     if passages.is_empty() && arguments.vtk.is_some() {

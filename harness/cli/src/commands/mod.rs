@@ -19,7 +19,7 @@ mod why;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use contract::failure::{EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_HOLDS, Result};
 use std::hint::black_box;
 use std::thread;
 
@@ -93,7 +93,7 @@ impl Command {
     ///
     /// # Errors
     /// If it has no result.
-    pub fn run(self) -> Result<u8, Failure> {
+    pub fn run(self) -> Result<u8> {
         match self {
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Selftest(arguments) => selftest::run(&arguments),

@@ -3,7 +3,7 @@
 use crate::options::{MeshArguments, Output, SelectionArguments, examples, number_in};
 use crate::output::put;
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_HOLDS, Failure, Result};
 use contract::mesh::Mesh;
 use report::picture::colour::Colour;
 use report::picture::{Picture, Request, format_of};
@@ -41,7 +41,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the mesh cannot be made or read, or a file cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
     let format = format_of(out)?;
     let is_possible = ranks.is_none() && !*ungraded || !Path::new(&source.mesh).is_dir();

@@ -3,7 +3,7 @@
 use crate::options::Input;
 use bench::experiments::entry::{self, Line};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, exit_first};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, Result, exit_first};
 use report::benchmark::numbers::{Checked, Number, check, included};
 use report::benchmark::report;
 use std::collections::HashSet;
@@ -27,7 +27,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// As [`write()`], or if a text cannot be read.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let numbers = write(&arguments.directory, &arguments.record)?;
     let mut code = EXIT_HOLDS;
     for main in &arguments.check {
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 
 /// Reads a text and those that it includes, without figures of reports, and without the numbers that the report in `directory` has just
 /// written.
-fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>, Failure> {
+fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
     let own = directory.join("numbers.tex").canonicalize().ok();
     let (mut paths, mut all) = (vec![main.to_owned()], Vec::new());
     let mut next = 0;

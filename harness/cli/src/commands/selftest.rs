@@ -4,7 +4,7 @@ use crate::options::Input;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
 use run::engine::runner::{Given, Programs};
@@ -26,7 +26,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If a case cannot be meshed.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let given = Given { reference: arguments.reference.clone(), ..Given::default() };
     let programs = Programs::find("mesher", &given)?;
     programs.reference.require()?;
@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let case = Case::read(&path)?;
         Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
     });
-    let cases = meshed.collect::<Result<Vec<SelftestCase>, Failure>>()?;
+    let cases = meshed.collect::<Result<Vec<SelftestCase>>>()?;
     let mutants = scratch.path().join("mutants");
     let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&cases, &mutants));
     let report = report.map_err(|error| Failure::at(&mutants, error))?;

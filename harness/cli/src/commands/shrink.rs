@@ -4,7 +4,7 @@ use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{fault, shrink, write};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use contract::files::{Staging, nearest_directory};
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
@@ -48,7 +48,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the engine does not support the case, or a program cannot be run.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let EngineArguments { engine, programs: given } = &arguments.engine;
     let programs = arguments.engine.find()?;
     programs.engine.require()?;

@@ -7,7 +7,7 @@ use bench::jsonl;
 use bench::track::history::{self, History, Record};
 use bench::track::{Series, VALUES_MIN, analyse};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use report::pretty;
 use report::track::{junit, page, summary};
 use run::engine::paths::Paths;
@@ -66,7 +66,7 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
 ///
 /// # Errors
 /// If the history cannot be read or continued, or a file cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let shown = arguments.history.display();
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     )
 }
 
-fn append(arguments: &Arguments) -> Result<(), Failure> {
+fn append(arguments: &Arguments) -> Result<()> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
     let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
@@ -124,7 +124,7 @@ fn append(arguments: &Arguments) -> Result<(), Failure> {
         let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
         Record::of_gate(&text, commit, repository).map_err(|why| Failure::about(file, why))
     };
-    let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>, Failure>>()?;
+    let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
     if records.is_empty() {
         let machine = machine::describe(&Paths::find().mpirun, repository).label();
         let of_commit = Record::of_commit(commit.unwrap_or("HEAD"), repository)?;

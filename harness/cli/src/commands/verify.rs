@@ -3,7 +3,7 @@
 use crate::options::{EngineArguments, Output, examples};
 use crate::output::put_forms;
 use clap::Args;
-use contract::failure::Failure;
+use contract::failure::Result;
 use report::verification::{json, junit, markdown, table};
 use run::verify::options::Options;
 use run::verify::verify;
@@ -28,7 +28,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the verification cannot begin, or a report cannot be written.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let report = verify(&arguments.options, &arguments.engine.find()?)?;
     let (shown, page) = (table(&report), markdown(&report));
     print!("{shown}");

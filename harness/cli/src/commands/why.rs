@@ -3,7 +3,7 @@
 use crate::options::{MeshArguments, examples, point};
 use check::why::{self, Mesh};
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_HOLDS, Failure, Result};
 use contract::mesh;
 use run::engine::layout::SERIAL;
 
@@ -23,7 +23,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the mesh cannot be made or read, or the point is outside its root.
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8> {
     let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;

@@ -7,7 +7,7 @@
 
 use super::TOLERANCE;
 use crate::digest::Digest;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word::{self, Leaf, Side};
@@ -45,7 +45,7 @@ impl Cells {
     ///
     /// # Errors
     /// If a cell is not a leaf of an oct-tree with this root, or overlaps another.
-    pub fn words(&self, root: &Root) -> Result<Vec<u64>, Failure> {
+    pub fn words(&self, root: &Root) -> Result<Vec<u64>> {
         let cell =
             |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
         let word = |i: usize| {
@@ -72,7 +72,7 @@ impl Cells {
     }
 
     /// The levels of the words differ from those of the file by one constant.
-    fn agree_with_levels(&self, words: &[u64]) -> Result<(), Failure> {
+    fn agree_with_levels(&self, words: &[u64]) -> Result<()> {
         let Some(levels) = &self.levels else { return Ok(()) };
         let offset = |i: usize| i64::from(word::level(words[i])).wrapping_sub(levels[i]);
         let differs = (1..words.len()).find(|&i| offset(i) != offset(0));
@@ -89,7 +89,7 @@ impl Cells {
     ///
     /// # Errors
     /// If there are no cells, if a number is not finite, or if the cells need more levels than exist.
-    pub fn least_root(&self) -> Result<Root, Failure> {
+    pub fn least_root(&self) -> Result<Root> {
         let unusable = |why: &str| {
             Failure::input(format!(
                 "the root cannot be derived from the cells, because {why}: give it with --root X,Y,Z,EDGE"
@@ -131,7 +131,7 @@ impl Cells {
 }
 
 /// The octant of a cell.
-fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, Failure> {
+fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant> {
     let why = "has an edge that is not positive, or coordinates that are not finite";
     Failure::unless(Root { origin: corner, edge }.is_cube(), why)?;
     let depth = (root.edge / edge).log2().round();

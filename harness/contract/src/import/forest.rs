@@ -8,7 +8,7 @@
 //! No memory is allocated for a count before the file has been seen to be long enough for it. Nothing else is checked here: indices
 //! and quadrants are those of the file.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::files;
 use bytemuck::{Pod, pod_collect_to_vec};
 use std::path::Path;
@@ -95,7 +95,7 @@ impl Forest {
 ///
 /// # Errors
 /// If the file cannot be read or is damaged.
-pub fn read(path: &Path) -> Result<Forest, Failure> {
+pub fn read(path: &Path) -> Result<Forest> {
     let bytes = files::read(path).map_err(Failure::unreadable)?;
     let mut input = Input { bytes: &bytes, at: 0 };
     let (connectivity, format) = connectivity(&mut input)?;
@@ -150,7 +150,7 @@ struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// The next `count` items of `size` bytes each.
-    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], Failure> {
+    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8]> {
         let left = &self.bytes[self.at..];
         let bytes = count.checked_mul(size).and_then(|bytes| usize::try_from(bytes).ok());
         let end = self.bytes.len();
@@ -162,16 +162,16 @@ impl<'a> Input<'a> {
     }
 
     /// As many numbers for each of `count` items.
-    fn numbers<T: Pod>(&mut self, count: u64, each: u64) -> Result<Vec<T>, Failure> {
+    fn numbers<T: Pod>(&mut self, count: u64, each: u64) -> Result<Vec<T>> {
         Ok(pod_collect_to_vec(self.items(count, each * size_of::<T>() as u64)?))
     }
 
-    fn array<const N: usize>(&mut self) -> Result<[u64; N], Failure> {
+    fn array<const N: usize>(&mut self) -> Result<[u64; N]> {
         Ok(self.numbers(N as u64, 1)?.try_into().expect("as many numbers as were read"))
     }
 
     /// The lists of `count` edges or corners, but for `of_tree`.
-    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Failure> {
+    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists> {
         let offsets = self.numbers(count.saturating_add(1), 1)?;
         let why = "it states trees at edges or corners, and none where trees meet";
         Failure::unless(count > 0 || pairs == 0, damaged(why))?;
@@ -180,14 +180,14 @@ impl<'a> Input<'a> {
     }
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
-    fn align(&mut self) -> Result<(), Failure> {
+    fn align(&mut self) -> Result<()> {
         let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
         self.items(padding as u64, 1).map(drop)
     }
 }
 
 /// The connectivity, and the format of the file.
-fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
+fn connectivity(input: &mut Input) -> Result<(Connectivity, u64)> {
     let (dimension, expected) = match input.items(8, 1)? {
         b"p4est\0\0\0" => (2, FORMAT_PLANE),
         b"p8est\0\0\0" => (3, FORMAT),

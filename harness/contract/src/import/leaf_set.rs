@@ -5,7 +5,7 @@ use super::TOLERANCE;
 use super::cells::Cells;
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset::{self, LeafSet};
@@ -28,7 +28,7 @@ pub fn leaf_set(
     given: Option<Root>,
     case: Option<&Case>,
     program: String,
-) -> Result<LeafSet, Failure> {
+) -> Result<LeafSet> {
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
     let root = stated.map_or_else(|| cells.least_root(), Ok)?;
     Failure::unless(root.is_cube(), format_args!("has a root that is not a cube: {root}"))?;
@@ -89,7 +89,7 @@ impl ImportedTree {
         root: Option<Root>,
         case: Option<&Case>,
         program: String,
-    ) -> Result<Option<Self>, Failure> {
+    ) -> Result<Option<Self>> {
         // Another array is VTK's to find.
         if sides.is_some_and(|sides| sides != SIDE) {
             return Ok(None);

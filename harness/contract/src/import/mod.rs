@@ -13,7 +13,7 @@ mod leaf_set;
 pub mod p4est;
 pub mod words;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
@@ -78,7 +78,7 @@ pub struct Request {
 /// # Errors
 /// If it cannot be read, or has none of the formats. Parts of a leaf set without a manifest must be requested by their
 /// format: a program that writes manifests did not finish such a directory.
-pub fn guess(path: &Path) -> Result<Format, Failure> {
+pub fn guess(path: &Path) -> Result<Format> {
     let is_directory = fs::metadata(path).map_err(Failure::unreadable)?.is_dir();
     refuse_leaf_set(path)?;
     let unknown = "its format was not recognised: choose one with --format (see --help)";
@@ -101,7 +101,7 @@ pub fn guess(path: &Path) -> Result<Format, Failure> {
 }
 
 /// Refuses a directory that is a leaf set already.
-fn refuse_leaf_set(path: &Path) -> Result<(), Failure> {
+fn refuse_leaf_set(path: &Path) -> Result<()> {
     let why = "has a manifest mesh.json, so it needs no import: `harness audit` shows whether it is complete";
     Failure::unless(!path.join(manifest::FILE).exists(), why)
 }
@@ -154,7 +154,7 @@ pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
 ///
 /// # Errors
 /// If there is none.
-pub fn side(code: f64, cell: usize) -> Result<Side, Failure> {
+pub fn side(code: f64, cell: usize) -> Result<Side> {
     let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
     known.ok_or_else(|| {
         Failure::input(format!(

@@ -9,7 +9,7 @@
 use super::cells::Cells;
 use super::forest::{self, Connectivity, LENGTHS, Quadrant, damaged};
 use super::{Request, side};
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word;
@@ -25,7 +25,7 @@ pub const FILLER: u8 = 3;
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
+pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     let forest = forest::read(path)?;
     let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
     Failure::unless(forest.connectivity.dimension == 3, why)?;
@@ -67,7 +67,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
 }
 
 /// The trees as cells.
-fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
+fn placed_trees(connectivity: &Connectivity) -> Result<Cells> {
     let Connectivity { vertices, tree_to_vertex, attributes, .. } = connectivity;
     let mut trees = Cells::default();
     if vertices.is_empty() {
@@ -104,7 +104,7 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
 }
 
 /// Adds the quadrants of a tree, which are complete: each begins where the one before it ends, on the Morton curve.
-fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Failure> {
+fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<()> {
     let Some(last) = quadrants.last() else { return Err(damaged("a tree has no quadrants")) };
     let ends_there = |&length: &i64| {
         let edge = length.checked_shr(last.level.try_into().ok()?)?;

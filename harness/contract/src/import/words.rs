@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::{Request, refuse_leaf_set};
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::lattice::Root;
 use crate::leafset::read_parts;
 use crate::npy::PartFile;
@@ -17,7 +17,7 @@ pub const SIDES: &str = "side";
 ///
 /// # Errors
 /// If a part cannot be read, or a word is not a leaf.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
+pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     if let Some(name) = request.sides.as_deref().filter(|name| *name != SIDES) {
         return Err(Failure::input(format!(
             "leaf words have no array {name}: request their sides with --sides {SIDES}"

@@ -13,7 +13,7 @@ use super::Patches;
 use crate::leaves::Leaves;
 use crate::options::Options;
 use crate::points::{Points, Polygons, edges};
-use contract::failure::Failure;
+use contract::failure::Result;
 
 /// The faces.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ impl Faces {
         points: &Points,
         patches: &Patches,
         options: &Options,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let mut all = Self::default();
         let mut of_patches = vec![Self::default(); patches.names.len()];
         let mut owned = Vec::new();

@@ -12,14 +12,14 @@ use contract::word;
 use super::Mesh;
 use crate::options::{Export, Label, Options};
 use crate::points::to_user;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 
 impl Mesh {
     /// Writes the files into a directory.
     ///
     /// # Errors
     /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
-    pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<(), Failure> {
+    pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<()> {
         let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices = faces.vertices.corners.len() as u64;
@@ -55,7 +55,7 @@ impl Mesh {
         self.write_boundary(options.label, dir)
     }
 
-    fn write_boundary(&self, label: Label, dir: &Path) -> Result<(), Failure> {
+    fn write_boundary(&self, label: Label, dir: &Path) -> Result<()> {
         let Self { patches, faces, .. } = self;
         let mut text = header("ascii", label, "polyBoundaryMesh", "boundary", "");
         let _ = writeln!(text, "{}\n(", patches.names.len());
@@ -97,14 +97,14 @@ impl<'a> ListFile<'a> {
         class: &str,
         object: &str,
         note: &str,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
         out.write_all(header("binary", options.label, class, object, note).as_bytes())?;
         Ok(Self { out, options })
     }
 
     /// Adds a list of `count` labels.
-    fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<(), Failure> {
+    fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<()> {
         match self.options.label {
             Label::Bits32 => self.list(count, labels.map(|label| label as i32)),
             Label::Bits64 => self.list(count, labels),
@@ -112,7 +112,7 @@ impl<'a> ListFile<'a> {
     }
 
     /// Adds a list of `n` items. A list without items has no parentheses.
-    fn list<T: NoUninit>(&mut self, n: u64, items: impl Iterator<Item = T>) -> Result<(), Failure> {
+    fn list<T: NoUninit>(&mut self, n: u64, items: impl Iterator<Item = T>) -> Result<()> {
         let [begin, end] = if n == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{n}\n{begin}")?;
         for (item, number) in items.zip(0..) {
@@ -123,7 +123,7 @@ impl<'a> ListFile<'a> {
     }
 
     /// Waits until the file is on disk.
-    fn finish(self) -> Result<(), Failure> {
+    fn finish(self) -> Result<()> {
         let file = self.out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
         Ok(file.sync_all()?)
     }

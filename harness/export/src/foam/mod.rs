@@ -20,7 +20,7 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::{Staging, nearest_directory};
 use contract::number::numbered;
 use contract::sets::Sets;
@@ -51,7 +51,7 @@ pub struct Mesh {
 ///
 /// # Panics
 /// If an invariant of the answer is violated: see `Faces::check_invariants`.
-pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     require_new(path)?;
     let of_mesh = read(export)?;
     let named = |error| Failure::at(path, error);
@@ -81,7 +81,7 @@ const CROSSED: &str = "warning: the geometry crosses cells of this mesh, and a f
      keep_crossing = false for a solver";
 
 /// The selected leaves as a mesh.
-fn read(export: &Export<'_>) -> Result<Mesh, Failure> {
+fn read(export: &Export<'_>) -> Result<Mesh> {
     let Export { mesh, options, .. } = *export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.parts.len() > 1).then(Vec::new);
@@ -97,7 +97,7 @@ fn read(export: &Export<'_>) -> Result<Mesh, Failure> {
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then the first.
-fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32), Failure> {
+fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32)> {
     // Sets of cells, which are represented by their first cells.
     let mut sets = Sets::new(leaves.count() as usize);
     leaves.walk(options, &mut |cell, _, squares| {
@@ -119,7 +119,7 @@ fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32),
 
 /// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They are
 /// numbered as the cells need them, so those of a cell are close together.
-fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
+fn points(leaves: &Leaves, options: &Options) -> Result<Points> {
     let mut points = Points::default();
     leaves.walk(options, &mut |_, octant, squares| {
         let (low, edge) = (octant.corner, octant.edge());
@@ -142,7 +142,7 @@ impl Mesh {
         mut ranks: Option<Vec<u32>>,
         patches: Patches,
         options: &Options<'_>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let (of_cell, regions, largest) = regions(&leaves, options)?;
         if options.regions == Regions::Largest && regions > 1 {
             let is_kept = |cell: u32| of_cell[cell as usize] == largest;

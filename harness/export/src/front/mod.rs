@@ -23,7 +23,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::fill_atomically;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::number::number;
@@ -68,7 +68,7 @@ struct Front {
 ///
 /// # Errors
 /// If the mesh is not a linear oct-tree or cannot be read, or if the user interrupts.
-fn front(export: &Export<'_>) -> Result<Vec<Face>, Failure> {
+fn front(export: &Export<'_>) -> Result<Vec<Face>> {
     // Without crossing leaves, exposed faces are those at holes.
     let leaves = Leaves::read(export, &mut |leaf, _| leaf.side != Side::Crossing)?;
     let (mut faces, mut words) = (Vec::new(), leaves.cells());
@@ -85,7 +85,7 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>, Failure> {
 ///
 /// # Errors
 /// If the mesh cannot be read, is not of the case, or has no such faces, if the file cannot be written, or if the user interrupts.
-pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let Export { mesh, options, .. } = export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     write(export, path, &|Front { root, faces, points, polygons }, out| {
@@ -115,7 +115,7 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
 ///
 /// # Errors
 /// As [`vtp`], and if the file exists, if there are more than 2^32 triangles, or if single precision does not resolve one.
-pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary> {
     // Nothing in a surface shows whether it is an export or the body that was meshed.
     require_new(path)?;
     write(export, path, &|front, out| Ok(write_stl_binary(&triangles(front)?, out)?))
@@ -125,8 +125,8 @@ pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
 fn write(
     export: &Export<'_>,
     path: &Path,
-    fill: &dyn Fn(&Front, &mut dyn Write) -> Result<(), Failure>,
-) -> Result<Summary, Failure> {
+    fill: &dyn Fn(&Front, &mut dyn Write) -> Result<()>,
+) -> Result<Summary> {
     export.mesh.require_sides()?;
     let faces = front(export)?;
     let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface";
@@ -177,7 +177,7 @@ fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<
 }
 
 /// The gap of each face in the user's units; infinite if the case has no facets.
-fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, Failure> {
+fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>> {
     let facets = FacetTree::new(&case.facets_lattice);
     let unit = case.root.edge / UNITS_PER_EDGE as f64;
     let gap = |(index, face): (u64, &Face)| {

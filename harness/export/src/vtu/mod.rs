@@ -17,7 +17,7 @@ use contract::lattice::Root;
 use contract::manifest::Sides;
 
 use crate::options::{Export, Summary};
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use piece::{Encoder, Piece};
 
 /// Maximum number of leaves in a piece.
@@ -47,7 +47,7 @@ const ARRAYS: [Array; 9] = [
 ///
 /// # Errors
 /// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
-pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let (mesh, leaves) = (export.mesh, export.count()?);
     let is_known = |(_, name, _): &Array| match *name {
         "rank" => mesh.tree_file.is_none(),

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Failure, Result, Watch};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Leak;
 use contract::word::{self, Side};
@@ -50,12 +50,12 @@ pub struct Leaks<'a, F> {
     watch: &'a dyn Watch,
 }
 
-impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
+impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     /// A case; `make` returns the sorted leaf words of its base tree at another surface level.
     ///
     /// # Errors
     /// If the case has no facets.
-    pub fn new(case: &'a Case, make: F, watch: &'a dyn Watch) -> Result<Self, Failure> {
+    pub fn new(case: &'a Case, make: F, watch: &'a dyn Watch) -> Result<Self> {
         let why = "the case has no facets, so nothing separates places";
         Failure::unless(!case.facets.is_empty(), why)?;
         let facets = FacetTree::new(&case.facets_lattice);
@@ -66,7 +66,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if `watch` is interrupted.
-    pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers, Failure> {
+    pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers> {
         let examined =
             ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
         let case = self.case;
@@ -74,7 +74,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         Ok(Answers { schema: SCHEMA, case: case.name.clone(), facets, root: case.root, examined })
     }
 
-    fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report, Failure> {
+    fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report> {
         let (root, level) = (&self.case.root, self.case.level_surface);
         let start = on_lattice("--from", from, root)?;
         let end = match to {
@@ -113,7 +113,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         Ok(report)
     }
 
-    fn make_tree(&mut self, level: u8) -> Result<(), Failure> {
+    fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
             self.watch.step(&format!("meshing the base tree of level {level}"));
             let words = (self.make)(level)?;
@@ -131,7 +131,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
 
     /// The finest coarser level at which the start is inside, if part of the root's boundary is outside there. The root may cut the body, so
     /// only that part is the far field.
-    fn closed(&mut self, start: Point) -> Result<Option<u8>, Failure> {
+    fn closed(&mut self, start: Point) -> Result<Option<u8>> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let words = &self.trees[&level];
@@ -146,7 +146,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
 
     /// Whether free leaves of a base tree join the ends, which lie in some. The far field is what is `outside` at that level, if there is one.
     /// The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<bool, Failure> {
+    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<bool> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let outside = outside.map(|level| &self.trees[&level][..]);
         let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
@@ -155,7 +155,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     }
 
     /// Coarsens the surface until the ends are not joined.
-    fn coarsen(&mut self, ends: Ends, outside: Option<u8>) -> Result<Option<Closes>, Failure> {
+    fn coarsen(&mut self, ends: Ends, outside: Option<u8>) -> Result<Option<Closes>> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let is_end_crossed = self.crossed(level, ends).is_some();
@@ -171,7 +171,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If a base tree cannot be made.
-    pub fn regions(&mut self, leaks: &[Leak]) -> Result<Vec<[f64; 3]>, Failure> {
+    pub fn regions(&mut self, leaks: &[Leak]) -> Result<Vec<[f64; 3]>> {
         let edge = self.case.root.edge;
         let level = |leak: &Leak| (edge / leak.spacing_coarse).log2().round() as u8;
         let Some(finest) = leaks.iter().map(level).max() else { return Ok(Vec::new()) };
@@ -190,7 +190,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If the end is outside the root, or a base tree cannot be made.
-    pub fn seed(&mut self, end: Target) -> Result<Option<[f64; 3]>, Failure> {
+    pub fn seed(&mut self, end: Target) -> Result<Option<[f64; 3]>> {
         let seeds = &self.case.seeds;
         let joined = match end {
             Target::Point(at) if seeds.len() > 1 => {
@@ -207,7 +207,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         level: u8,
         end: [f64; 3],
         places: &[[f64; 3]],
-    ) -> Result<Option<[f64; 3]>, Failure> {
+    ) -> Result<Option<[f64; 3]>> {
         let root = self.case.root;
         let end = on_lattice("--to", end, &root)?;
         self.make_tree(level)?;

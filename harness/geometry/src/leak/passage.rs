@@ -17,7 +17,7 @@ use super::space::Space;
 use super::{Ends, to_user};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Result, Watch};
 use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
@@ -88,7 +88,7 @@ pub fn widest(
     space: Space,
     (from, to): Ends,
     watch: &dyn Watch,
-) -> Result<Passage, Failure> {
+) -> Result<Passage> {
     let facets = space.facets;
     let before = approach(&space, from);
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
@@ -141,7 +141,7 @@ fn root() -> Aabb {
 
 impl Search<'_> {
     /// The widest path.
-    fn converge(&mut self) -> Result<Way, Failure> {
+    fn converge(&mut self) -> Result<Way> {
         let (mut cap, mut searches) = (f32::INFINITY, 0);
         loop {
             let found = self.space.widest(self.ends, cap, Space::radius, self.watch)?;

@@ -9,7 +9,7 @@ use std::iter::successors;
 
 use super::{Ends, leaf_at};
 use crate::tree::{FacetTree, Point};
-use contract::failure::{Failure, Watch};
+use contract::failure::{Result, Watch};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, KEY_END, Order, Side};
@@ -186,7 +186,7 @@ impl<'a> Space<'a> {
         cap: f32,
         width: fn(&mut Self, u32) -> f64,
         watch: &dyn Watch,
-    ) -> Result<Option<(Vec<u32>, f32)>, Failure> {
+    ) -> Result<Option<(Vec<u32>, f32)>> {
         let (start, end) = (self.locate(from), to.map(|to| self.locate(to)));
         let mut via = vec![start; self.cells.len()];
         let mut labels = vec![(-1f32, f32::INFINITY); self.cells.len()];

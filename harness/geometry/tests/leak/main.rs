@@ -3,7 +3,7 @@
 mod openings;
 
 use contract::case::{Case, Facet};
-use contract::failure::{Failure, Watch};
+use contract::failure::{Failure, Result, Watch};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
 use geometry::leak::Leaks;
@@ -36,11 +36,11 @@ fn case(facets: &[Facet], level: u8) -> Case {
     case_in(ROOT, facets, level)
 }
 
-fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, Failure> {
+fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report> {
     answers(case, (from, to)).map(|mut answers| answers.examined.remove(0))
 }
 
-fn answers(case: &Case, ends: ([f64; 3], Target)) -> Result<Answers, Failure> {
+fn answers(case: &Case, ends: ([f64; 3], Target)) -> Result<Answers> {
     Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), &Silent)?.answers(&[ends])
 }
 

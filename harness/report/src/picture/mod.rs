@@ -10,7 +10,7 @@ mod tests;
 
 use colour::{Colour, Entry};
 use contract::case::Facet;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::mesh::Mesh;
@@ -115,7 +115,7 @@ impl Picture {
     ///
     /// # Errors
     /// If the mesh cannot be read, or the picture would be empty.
-    pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, Failure> {
+    pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self> {
         let (root, colour) = (mesh.manifest.root, request.colour);
         let is_known = colour != Colour::Side || mesh.manifest.sides == Sides::Known;
         Failure::unless(is_known, "the sides of this mesh are unknown: choose another colour")?;

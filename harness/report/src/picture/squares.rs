@@ -6,7 +6,7 @@
 
 use super::colour::Colour;
 use super::plane_axes;
-use contract::failure::{Failure, Watch};
+use contract::failure::{Result, Watch};
 use contract::mesh::Mesh;
 use contract::octant::CELLS_PER_EDGE;
 use export::selection::Selection;
@@ -71,7 +71,7 @@ impl Squares {
         colour: Colour,
         [level_drawn, level_outlined]: [u8; 2],
         squares_max: usize,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let mut found = Self { level_outlined, level_drawn, ..Self::default() };
         selection.visit(mesh, &|| Progress.check(), &mut |leaf| {

@@ -17,7 +17,7 @@ use crate::engine::runner::Programs;
 use crate::progress::Progress;
 use case::CaseRun;
 use contract::catalogue::Selected;
-use contract::failure::Failure;
+use contract::failure::{Failure, Result};
 use contract::files::publications;
 use options::{Needs, Options};
 use report::{Asked, CaseReport, Report};
@@ -31,7 +31,7 @@ use tempfile::TempDir;
 ///
 /// # Errors
 /// If the verification could not begin. Failures after that are in the report.
-pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure> {
+pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let start = Instant::now();
     programs.engine.require()?;
     if programs.engine.description.promises.definition {
@@ -85,7 +85,7 @@ struct Verification<'a> {
 }
 
 impl Verification<'_> {
-    fn case(&self, selected: &Selected) -> Result<CaseReport, Failure> {
+    fn case(&self, selected: &Selected) -> Result<CaseReport> {
         let start = Instant::now();
         let place = self.workplace.enter(&selected.name)?;
         // A case that the harness cannot read is passed on unchanged, because refusing it is part of the verification.
@@ -130,7 +130,7 @@ impl Workplace {
     ///
     /// # Errors
     /// If it cannot be made.
-    fn new(options: &Options) -> Result<Self, Failure> {
+    fn new(options: &Options) -> Result<Self> {
         if let Some(out) = &options.out {
             let root = fs::create_dir_all(out).and_then(|()| fs::canonicalize(out));
             let root = root.map_err(|error| Failure::at(out, error))?;
@@ -144,7 +144,7 @@ impl Workplace {
     ///
     /// # Errors
     /// If something else has that name, or the directory cannot be made.
-    fn enter(&self, case: &str) -> Result<PathBuf, Failure> {
+    fn enter(&self, case: &str) -> Result<PathBuf> {
         let place = self.root.join(case);
         let shown = place.display();
         if place.join(MARKER).is_file() {
