@@ -58,7 +58,7 @@ def npy(path, request):
 
 def csv(path, request):
     """Lines of fields, separated by commas, or by semicolons or white space. A first line that is not numeric names the columns, and so does a
-    comment before it with as many words as there are fields, as NumPy writes it. Other lines that begin with # are comments."""
+    comment before it with as many words as there are fields, x, y and z among them, as NumPy writes it. Other lines that begin with # are comments."""
     text = read_text(path)
     for number, line in enumerate(text.splitlines(), 1):
         fields = [field.strip() for field in line.partition("#")[0].split(",")]
@@ -73,9 +73,9 @@ def csv(path, request):
     cells = lines[is_named:]
     if not cells:
         raise Refused("has no cells")
-    words = comments[-1].lstrip("#").split() if comments and not is_named else []
-    if len(words) == len(names) and not any(map(is_number, words)):
-        names, is_named = words, True
+    if not is_named:
+        names = named_in(comments, len(names)) or names
+        is_named = not is_number(names[0])
     try:
         columns = np.loadtxt(cells, ndmin=2, comments=None).T
     except ValueError as why:
@@ -83,6 +83,18 @@ def csv(path, request):
     if is_named and len(names) != len(columns):
         raise Refused(f"has {len(columns)} fields in a line, but {len(names)} names of columns")
     return rows(list(zip(names, columns)) if is_named else named(columns).items(), request)
+
+
+def named_in(comments, count):
+    """The names of this many columns that a comment states, if one does. Refuses comments that state another order than x y z level in another form."""
+    for words in (comment.lstrip("#").split() for comment in reversed(comments)):
+        if len(words) == count and {"x", "y", "z"} <= {word.lower() for word in words}:
+            return words
+    for comment in comments:
+        order = [word for word in re.findall(r"[a-z]+", comment.lower()) if word in ("x", "y", "z", "level", "edge")]
+        if {"x", "y", "z"} <= set(order) and order[:4] not in (["x", "y", "z"], ["x", "y", "z", "level"]):
+            raise Refused(f"has a comment that is no list of {count} names: {comment}. Give one word per column, such as # {' '.join(order)}")
+    return None
 
 
 def is_number(field):
@@ -119,6 +131,8 @@ def rows(columns, request):
 
     position, root, sides = request["position"], None, request["sides"]
     at = np.column_stack([column(axis) for axis in "xyz"])
+    if not len(at):
+        raise Refused("has no cells")
     if "level" not in columns and "edge" in columns:
         if position == "index":
             raise Refused("positions by index need a column level")

@@ -271,6 +271,27 @@ class ImportTest(unittest.TestCase):
         message = self.refused(self.at / "moved.vtu", "--sides", "absent")
         self.assertIn("not an axis-aligned cube", message)
 
+    def test_names_of_columns_in_comments_are_used_or_refused(self):
+        path = self.at / "cells.txt"
+        cells = [" ".join(map(str, row)) for row in ([0, 0, 0, 1], [2, 0, 0, 1], [0, 2, 0, 1], [2, 2, 0, 1])]
+        heads = {
+            "x y z level": 0, "z y x level": 2, "Z Y X Level\n# exported by mytool 1.2": 2, "four words of prose\n# z y x level": 2,
+            "of a case, x y z level in this order": 0, "made by mytool": 0,
+        }
+        found = {}
+        for head, axis in heads.items():
+            path.write_text(f"# {head}\n" + "\n".join(cells))
+            words, _ = self.imported(path, "--root", "0,0,0,4")
+            found.setdefault(axis, []).append(words.tolist())
+        self.assertNotEqual(found[0][0], found[2][0])
+        for same in found.values():
+            self.assertTrue(all(words == same[0] for words in same))
+        for head in ("z [m],y [m],x [m],level", "columns: z y x level", "z:y:x:level", "the columns x y z edge"):
+            path.write_text(f"# {head}\n" + "\n".join(cells))
+            self.assertIn("has a comment that is no list of 4 names", self.refused(path, "--root", "0,0,0,4"))
+        np.save(self.at / "empty.npy", np.zeros((0, 4)))
+        self.assertIn("has no cells", self.refused(self.at / "empty.npy", "--root", "0,0,0,4"))
+
     def test_cells_without_a_size_or_a_place_are_named(self):
         path = self.at / "cells.csv"
         for cell in ("1,0,0,0", "1,0,0,-1", "1,0,nan,1", "inf,0,0,1"):

@@ -90,6 +90,13 @@ fn a_mesh_on_disk_is_drawn_without_geometry_unless_its_case_is_given() {
 }
 
 #[test]
+fn a_picture_of_a_box_is_a_slice_through_it() {
+    let fixture = Fixture::new();
+    let (code, text) = fixture.picture("case.toml --out a.svg --clip 0,0,0.5,1,1,0.75");
+    assert!(code == 0 && text.contains("z = 0.625"), "{text}");
+}
+
+#[test]
 fn impossible_requests_are_one_sentence_and_leave_no_file() {
     let fixture = Fixture::new();
     fs::write(fixture.path("other.toml"), CASE.replace("0.25", "0.5")).unwrap();
@@ -99,6 +106,7 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         ("mesh --out a.svg --ranks 2", 2, "are for a case"),
         ("mesh --out a.svg --slice z=9", 2, "--slice z=9"),
         ("mesh --out a.svg --slice z=0 --level-max 0", 2, "no leaf of the selection"),
+        ("mesh --out a.svg --slice z=0 --clip -1,-1,0.3,1,1,0.9", 2, "no leaf of the selection"),
         ("mesh --out a.svg --case other.toml", 2, "the mesh is not of the case other"),
         ("mesh --out a.svg --zoom 0", 2, "from 1 to 1000000"),
         ("nowhere.toml --out a.svg", 2, "nowhere.toml"),

@@ -3,7 +3,7 @@
 
 use crate::digest::Digest;
 use crate::failure::{Failure, Result, named};
-use crate::manifest::{self, Manifest, Part};
+use crate::manifest::{self, Manifest, Part, part_name};
 use crate::mesh::{Mesh, part_names};
 use crate::npy::{self, PartFile};
 use ::files::Claim;
@@ -45,6 +45,13 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>> {
     let names = part_names(dir)?;
     let why = Failure::about(dir, "it has neither mesh.json nor an array of leaves");
     Failure::unless(!names.is_empty(), why)?;
+    // The names of the mesher tell how many there were.
+    let last = part_name(names.len() - 1);
+    let is_number = |name: &str| name.as_bytes()[7..12].iter().all(u8::is_ascii_digit);
+    let is_beyond = |name: &String| name.len() == last.len() && *name > last && is_number(name);
+    let why =
+        Failure::about(dir, format!("a part is missing: the last of {} is {last}", names.len()));
+    Failure::unless(!names.iter().any(is_beyond), why)?;
     let read = |name: String| {
         let path = dir.join(&name);
         let part = PartFile::open(&path).map_err(|why| why.of_file(&path))?;
@@ -135,6 +142,21 @@ mod tests {
         fs::write(dir.path().join("d.npy"), "").unwrap();
         let why = read_parts(dir.path()).unwrap_err().to_string();
         assert!(why.contains("d.npy: the part has no npy header"), "{why}");
+    }
+
+    #[test]
+    fn a_missing_part_is_known_by_the_numbers_of_the_others() {
+        let dir = tempfile::tempdir().unwrap();
+        for (index, is_whole) in [(0, true), (2, false), (1, true)] {
+            npy::write(&dir.path().join(part_name(index)), &[7]).unwrap();
+            assert_eq!(read_parts(dir.path()).is_ok(), is_whole, "{index}");
+        }
+        npy::write(&dir.path().join("leaves-outer.npy"), &[7]).unwrap();
+        assert_eq!(read_parts(dir.path()).unwrap().len(), 4);
+        fs::remove_file(dir.path().join(part_name(0))).unwrap();
+        fs::remove_file(dir.path().join("leaves-outer.npy")).unwrap();
+        let why = read_parts(dir.path()).unwrap_err().to_string();
+        assert!(why.ends_with("a part is missing: the last of 2 is leaves-00001.npy"), "{why}");
     }
 
     #[test]

@@ -78,17 +78,12 @@ pub const FORMATS: &[Format] = &[
 ///
 /// # Errors
 /// As the other format, and if the script fails.
-fn made(
-    format: &str,
-    (name, write): (&str, Write),
-    export: &Export<'_>,
-    path: &Path,
-) -> Result<Summary> {
+fn made(kind: &str, (name, write): (&str, Write), export: &Export, path: &Path) -> Result<Summary> {
     let failed = |error: io::Error| Failure::at(path, error);
     let place = Staging::beside(path).map_err(failed)?;
     let (source, file) = (place.path().join(name), place.path().join("made"));
     let written = write(export, &source)?;
-    (export.options.script)(format, &source, &file)?;
+    (export.options.script)(kind, &source, &file)?;
     let mut made = File::open(&file).map_err(failed)?;
     let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
     let bytes = fill_atomically(path, copy)?;

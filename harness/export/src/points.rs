@@ -47,14 +47,12 @@ impl Points {
     /// Appends the points within an edge, in order: those that bisect it, or bisect a half of it, and so on. Squares are aligned with the
     /// oct-tree, so where there are any, one is the middle.
     fn hanging(&self, from: Point, to: Point, polygon: &mut Vec<u32>) {
-        let middle = std::array::from_fn(|a| u32::midpoint(from[a], to[a]));
-        match self.numbers.get(&middle) {
-            Some(&number) if middle != from && middle != to => {
-                self.hanging(from, middle, polygon);
-                polygon.push(number);
-                self.hanging(middle, to, polygon);
-            }
-            _ => {}
+        let middle: Point = std::array::from_fn(|a| u32::midpoint(from[a], to[a]));
+        let number = self.numbers.get(&middle).filter(|_| middle != from && middle != to);
+        if let Some(&number) = number {
+            self.hanging(from, middle, polygon);
+            polygon.push(number);
+            self.hanging(middle, to, polygon);
         }
     }
 }

@@ -4,9 +4,9 @@
 //! that they have, and no ray counts them.
 
 use contract::case::Facet;
-use contract::lattice::{self, sorted};
+use contract::lattice::{self, FacetLattice, normal, sorted};
 use serde::Serialize;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -125,6 +125,23 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
         });
     }
     findings
+}
+
+/// Facets without area with a vertex that no facet with area has. A facet at those of others, as of a T-junction, changes nothing.
+pub fn stray(input: &Input, edges: &Edges, first: usize) -> Finding {
+    let mut finding = Finding::new(Kind::Stray);
+    let has_area = |of: &FacetLattice| normal(of) != [0; 3];
+    let (flat, others): (Vec<_>, Vec<_>) = (0u32..)
+        .zip(&edges.corners)
+        .zip(&input.case.facets_lattice)
+        .partition(|of| !has_area(of.1));
+    let used: HashSet<u32> = others.iter().flat_map(|((_, corners), _)| **corners).collect();
+    for ((facet, corners), _) in flat {
+        if !corners.iter().all(|corner| used.contains(corner)) {
+            finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
+        }
+    }
+    finding
 }
 
 /// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.

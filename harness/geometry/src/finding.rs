@@ -22,6 +22,8 @@ pub enum Kind {
     InsideOut,
     /// Closed shells that lie in an odd number of other closed ones.
     Nested,
+    /// Facets without area with a vertex that no facet with area has.
+    Stray,
     /// Facets with the three vertices of an earlier facet, in any order. The kinds below count copies of the same winding once.
     Duplicates,
     /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
@@ -94,7 +96,7 @@ impl Kind {
     /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
-            Self::NonManifoldOdd | Self::Duplicates | Self::OutsideRoot => true,
+            Self::NonManifoldOdd | Self::Stray | Self::Duplicates | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -115,6 +117,8 @@ impl Kind {
                 "No effect, but normals point inward: other programs may exchange inside and outside."),
             Self::Nested => ("closed shells in closed shells",
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
+            Self::Stray => ("facets without area, apart",
+                "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. The root grows to hold them. Remove them."),
             Self::Duplicates => ("duplicate facets",
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
             Self::Intersections => ("intersecting pairs of facets",
@@ -263,6 +267,7 @@ mod tests {
             Kind::Winding,
             Kind::InsideOut,
             Kind::Nested,
+            Kind::Stray,
             Kind::Duplicates,
             Kind::Intersections,
             Kind::ThinWalls,
@@ -274,9 +279,9 @@ mod tests {
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
         assert!(
-            meanings[11].starts_with("No effect: the facets overlap back to back in one plane")
+            meanings[12].starts_with("No effect: the facets overlap back to back in one plane")
         );
-        assert!(meanings[6].starts_with("Where two closed shells overlap"));
+        assert!(meanings[7].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();
         assert_eq!(meanings.len(), kinds.len() + 1);
@@ -285,16 +290,16 @@ mod tests {
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
-        let always = [Kind::NonManifoldOdd, Kind::Duplicates];
-        let all = [always[0], always[1], Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot];
+        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Duplicates];
+        let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(
             changing(Keep::Outside),
-            [always[0], always[1], Kind::ThinGaps, Kind::OutsideRoot]
+            [&always[..], &[Kind::ThinGaps, Kind::OutsideRoot]].concat()
         );
         assert_eq!(
             changing(Keep::Inside),
-            [always[0], always[1], Kind::ThinWalls, Kind::OutsideRoot]
+            [&always[..], &[Kind::ThinWalls, Kind::OutsideRoot]].concat()
         );
     }
 }

@@ -32,6 +32,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let mut findings = vec![openings::openings(input, &edges, first)];
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
+    findings.push(edges::stray(input, &edges, first));
     findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
     findings.push(intersections::intersections(input, &tree, first));

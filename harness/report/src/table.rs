@@ -37,11 +37,10 @@ impl Table {
         let all = || head.iter().chain(&self.rows);
         let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let aligned =
-            |(column, field): (usize, &String)| match (self.is_number(column), widths[column]) {
-                (false, width) => format!("{field:<width$}"),
-                (true, width) => format!("{field:>width$}"),
-            };
+        let aligned = |(column, field): (usize, &String)| match widths[column] {
+            width if self.is_number(column) => format!("{field:>width$}"),
+            width => format!("{field:<width$}"),
+        };
         let line = |row: &Vec<String>| {
             let fields: Vec<String> = row.iter().enumerate().map(aligned).collect();
             fields.join("  ").trim_end().to_owned()

@@ -60,7 +60,9 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     let row = |both: &(&Series, &Change)| {
         let (series, change) = *both;
         let [before, after, by] = values(series, change);
-        let sign = series.is_worse(change).map(|worse| if worse { "worse" } else { "better" });
+        let sign = series
+            .is_worse(change.step.before, change.step.after)
+            .map(|worse| if worse { "worse" } else { "better" });
         vec![
             html! { (series.name) },
             html! { (before) },
@@ -137,12 +139,13 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
     let x = |at: usize| series.points[at].0 as f64;
     let (low, high) = range(series);
     let mark = |change: &Change| {
-        let (name, style) = match (series.is_worse(change), change.accepted) {
-            (None, _) => ("change", 3),
-            (Some(_), true) => ("accepted", 3),
-            (Some(true), false) => ("worse", 1),
-            (Some(false), false) => ("better", 2),
-        };
+        let (name, style) =
+            match (series.is_worse(change.step.before, change.step.after), change.accepted) {
+                (None, _) => ("change", 3),
+                (Some(_), true) => ("accepted", 3),
+                (Some(true), false) => ("worse", 1),
+                (Some(false), false) => ("better", 2),
+            };
         // Between the last commit with the old value and the first with the new one.
         let at = change.step.at;
         Plotted::vertical(name, style, x(at - 1).midpoint(x(at)), (low, high))

@@ -20,11 +20,9 @@ pub fn table(report: &Report) -> String {
 
 /// The report as Markdown, for the summary page of a CI system and for the report of the demo.
 pub fn markdown(report: &Report) -> String {
-    let mut text = format!("## harness verify\n\n{}\n\n", report.verdict());
-    text += &table_of(report).markdown();
-    text.push('\n');
-    text.extend(remarks(report).iter().map(|remark| format!("- {}\n", escaped(remark))));
-    text
+    let (verdict, table) = (report.verdict(), table_of(report).markdown());
+    let remarks = remarks(report).into_iter().map(|remark| format!("- {}\n", escaped(&remark)));
+    format!("## harness verify\n\n{verdict}\n\n{table}\n{}", remarks.collect::<String>())
 }
 
 fn table_of(report: &Report) -> Table {
@@ -81,9 +79,8 @@ fn numbers(Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<Stri
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.
 fn remarks(report: &Report) -> Vec<String> {
-    let missing = report.missing.iter();
-    let mut lines: Vec<String> =
-        missing.map(|m| format!("left out: {} because {}", m.what, m.why)).collect();
+    let missing = report.missing.iter().map(|m| format!("left out: {} because {}", m.what, m.why));
+    let mut lines: Vec<String> = missing.collect();
     for case in &report.cases {
         let name = &case.name;
         lines.extend(case.input_error.iter().map(|error| format!("input: {name}: {error}")));
@@ -169,9 +166,7 @@ fn check_junit(xml: &quick_junit::Report, report: &Report) {
 }
 
 fn tests(case: &CaseReport) -> impl Iterator<Item = TestCase> {
-    let refused = case.input_error.iter();
-    let refused =
-        refused.map(|error| test("the programs take the case", unsuccessful(Error, error), ""));
+    let refused = |why: &String| test("the programs take the case", unsuccessful(Error, why), "");
     let of_check = |check: &Check| {
         let ended = match &check.outcome {
             Outcome::Pass { .. } => TestCaseStatus::success(),
@@ -183,7 +178,7 @@ fn tests(case: &CaseReport) -> impl Iterator<Item = TestCase> {
         test.set_time(Duration::from_secs_f64(check.time_s));
         test
     };
-    case.checks.iter().map(of_check).chain(refused)
+    case.checks.iter().map(of_check).chain(case.input_error.iter().map(refused))
 }
 
 #[cfg(test)]

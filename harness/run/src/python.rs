@@ -41,15 +41,22 @@ fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Fa
         let why = format!("needs Python at {} (ci/setup installs it)", python.display());
         return Err(Failure::new(name, End::Missing(why)));
     }
+    let script = paths.root.join("harness/oracles").join(script);
+    if !script.is_file() {
+        let why = format!("needs {}: set HARNESS_ROOT to the repository", script.display());
+        return Err(Failure::new(name, End::Missing(why)));
+    }
     let mut command = Command::new(python);
-    command.arg("-B").arg(paths.root.join("harness/oracles").join(script));
+    command.arg("-B").arg(script);
     Ok(command)
 }
 
 /// The failure of a script, in which a missing package is called so.
 fn explained(failure: Failure) -> Failure {
     match failure.end {
-        End::Exited { code: CODE_MISSING, error } => {
+        End::Exited { code, error }
+            if code == CODE_MISSING || error.contains("ModuleNotFoundError") =>
+        {
             Failure::new(failure.program, End::Missing(format!("is not installed: {error}")))
         }
         _ => failure,

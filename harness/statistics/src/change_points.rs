@@ -202,8 +202,8 @@ const OUTLIER: f64 = 2.0;
 /// Number of values in a neighbourhood.
 const NEIGHBOURHOOD: usize = 9;
 
-/// Moves outliers towards the median of their neighbourhood, to the greatest distance that other values have. Series of
-/// which most values equal their predecessor are returned unchanged.
+/// Moves outliers towards the median of their neighbourhood, to the greatest distance that other values have. In series of
+/// which most values equal their predecessor, one that occurs once becomes its predecessor.
 fn without_outliers(values: &[f64]) -> Vec<f64> {
     let (n, width) = (values.len(), NEIGHBOURHOOD.min(values.len()));
     let differences: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
@@ -211,7 +211,14 @@ fn without_outliers(values: &[f64]) -> Vec<f64> {
     let deviation = median_of(&differences) / (0.6745 * std::f64::consts::SQRT_2);
     let limit = OUTLIER * deviation;
     if limit == 0.0 {
-        return values.to_vec();
+        // One other value is no level.
+        let mut clean = values.to_vec();
+        for i in 1..n {
+            if values[i] != clean[i - 1] && values.get(i + 1) != Some(&values[i]) {
+                clean[i] = clean[i - 1];
+            }
+        }
+        return clean;
     }
     let moved = |i: usize| {
         let from = i.saturating_sub(width / 2).min(n - width);
@@ -235,7 +242,24 @@ mod tests {
         let clean = without_outliers(&values);
         assert!(clean[7] < 30.0 && clean[8..] == values[8..], "{clean:?}");
         let exact = [7.0, 7.0, 7.0, 9.0, 7.0, 7.0];
-        assert_eq!(without_outliers(&exact), exact);
+        assert_eq!(without_outliers(&exact), [7.0; 6]);
+        let levels = [7.0, 7.0, 7.0, 7.0, 9.0, 9.0, 9.0];
+        assert_eq!(without_outliers(&levels), levels);
+    }
+
+    #[test]
+    fn one_other_value_of_an_exact_series_is_no_step_and_two_are_one() {
+        for n in [10, 40, 50, 100] {
+            let changed = |from: usize, to: usize| -> Vec<(usize, f64, f64)> {
+                let value = |i| if (from..to).contains(&i) { 1500.0 } else { 1374.0 };
+                let steps = change_points(&(0..n).map(value).collect::<Vec<_>>(), 0.01);
+                steps.into_iter().map(|step| (step.at, step.before, step.after)).collect()
+            };
+            for at in [n / 2, n - 1] {
+                assert_eq!(changed(at, at + 1), [], "{at} of {n}");
+            }
+            assert_eq!(changed(n - 5, n), [(n - 5, 1374.0, 1500.0)], "{n}");
+        }
     }
 
     #[test]

@@ -60,9 +60,8 @@ impl Metadata {
     pub(crate) fn finish(self, root: u64) -> (Vec<u8>, Vec<u8>) {
         let mut superblock = SIGNATURE.to_vec();
         superblock.extend([3, 8, 8, 0]);
-        for address in [0, UNDEFINED, self.end(), root] {
-            superblock.extend(address.to_le_bytes());
-        }
+        let addresses = [0, UNDEFINED, self.end(), root].map(u64::to_le_bytes);
+        superblock.extend(addresses.as_flattened());
         close(&mut superblock);
         (self.bytes, superblock)
     }
@@ -119,12 +118,10 @@ impl Metadata {
         add_message(&mut header, message::DATASPACE, &simple(array.len));
         add_message(&mut header, message::DATATYPE, datatype::BYTE);
         add_message(&mut header, message::FILL_VALUE, &ALLOCATED_BY_CHUNK);
-        let dims = [array.chunk_len, 1];
         let bytes = array.dim_bytes();
         let mut layout = vec![LAYOUT_VERSION, LAYOUT_CHUNKED, 0, 2, bytes as u8];
-        dims.iter().for_each(|dim| layout.extend(&dim.to_le_bytes()[..bytes]));
-        layout.extend([INDEX_FIXED_ARRAY, PAGE_BITS]);
-        layout.extend(table.to_le_bytes());
+        [array.chunk_len, 1].iter().for_each(|dim| layout.extend(&dim.to_le_bytes()[..bytes]));
+        layout.extend([INDEX_FIXED_ARRAY, PAGE_BITS].into_iter().chain(table.to_le_bytes()));
         add_message(&mut header, message::LAYOUT, &layout);
         // One filter, zlib (1), not optional, with one parameter.
         let filter = [2, 1, 1, 0, 0, 0, 1, 0, LEVEL as u8, 0, 0, 0];
@@ -135,13 +132,11 @@ impl Metadata {
     /// Adds the table of an array's chunks; returns the address of the table's header, which the table follows.
     fn table(&mut self, array: &Chunked) -> u64 {
         let size_bytes = array.size_bytes();
-        let mut header = b"FAHD\x00\x01".to_vec();
-        header.extend([8 + size_bytes as u8 + 4, PAGE_BITS]);
-        header.extend((array.chunks.len() as u64).to_le_bytes());
-        header.extend((self.end() + TABLE_HEAD_BYTES).to_le_bytes());
-        let header_at = self.block(header);
-        let mut table = b"FADB\x00\x01".to_vec();
-        table.extend(header_at.to_le_bytes());
+        let sizes = [8 + size_bytes as u8 + 4, PAGE_BITS];
+        let numbers = [array.chunks.len() as u64, self.end() + TABLE_HEAD_BYTES];
+        let numbers = numbers.map(u64::to_le_bytes);
+        let header_at = self.block([b"FAHD\x00\x01", &sizes[..], numbers.as_flattened()].concat());
+        let mut table = [b"FADB\x00\x01", &header_at.to_le_bytes()[..]].concat();
         for chunk in &array.chunks {
             let stored = chunk.as_ref().map(|at| (at.start, at.end - at.start));
             let (address, bytes) = stored.unwrap_or((UNDEFINED, 0));
@@ -171,10 +166,7 @@ pub(crate) fn link(name: &str, address: u64) -> Vec<u8> {
 /// Appends a message of an object header.
 fn add_message(header: &mut Vec<u8>, code: u8, body: &[u8]) {
     let bytes = u16::try_from(body.len()).expect("a message has less than 64 KiB");
-    header.push(code);
-    header.extend(bytes.to_le_bytes());
-    header.push(0);
-    header.extend(body);
+    header.extend([&[code], &bytes.to_le_bytes()[..], &[0], body].concat());
 }
 
 /// Appends the checksum of a block.

@@ -57,7 +57,7 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
     }
     let add = |sum: [i128; 4], of: [i128; 4]| std::array::from_fn(|i| sum[i] + of[i]);
     let [x, y, z, area] = over_ranks(sums, add, comm);
-    length([x, y, z]).min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
+    length([x, y, z]).min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64 && area > 0
 }
 
 /// Twice the area that the boundary of the facets of all ranks encloses: of each of its loops, the vector area. Collective.

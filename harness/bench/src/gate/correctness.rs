@@ -99,8 +99,12 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
     };
     Some(match baseline {
         None => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
-        Some(_) if check.name == RUNS && new > 0 && verdict == Verdict::Unchanged => {
-            noted(Verdict::Missing, format!("neither program makes a mesh: {why}"))
+        Some(_) if check.name == RUNS && old > Some(0) => {
+            let who = if new > 0 { "neither program makes" } else { "the baseline does not make" };
+            noted(Verdict::Missing, format!("{who} a mesh: {why}"))
+        }
+        Some(_) if old.is_none() => {
+            noted(verdict, format!("the baseline's was not checked: {why}"))
         }
         Some(_) => {
             let values = [old.unwrap_or(0), new].map(|count| count as f64);
@@ -160,6 +164,21 @@ mod tests {
     }
 
     #[test]
+    fn a_baseline_without_a_mesh_is_compared_with_nothing() {
+        let checks = vec![Check::new("serial", RUNS, Outcome::fail("it crashes"))];
+        let baseline = CaseReport { name: "c".into(), checks, ..CaseReport::default() };
+        let mut candidate = case(&[]);
+        candidate.checks.push(Check::new("serial", RUNS, Outcome::held(2)));
+        let all = findings(&on(&[]), &candidate, Some(&baseline));
+        assert!(all.iter().all(|finding| finding.compared == 0), "{all:?}");
+        let worst = all.iter().max_by_key(|finding| finding.verdict).unwrap();
+        assert_eq!(worst.verdict, Verdict::Missing);
+        assert!(worst.note.contains("the baseline does not make a mesh"), "{worst:?}");
+        let worse = against(&case(&[("layer", 7)]), &baseline);
+        assert_eq!((worse.verdict, worse.compared), (Verdict::Regression, 0));
+    }
+
+    #[test]
     fn only_new_and_more_findings_are_a_regression() {
         let baseline = case(&[("layer", 7), ("spacing", 2)]);
         let of = |failed: &[(&str, u64)]| against(&case(failed), &baseline).verdict;
@@ -171,7 +190,10 @@ mod tests {
         let improved = better.iter().filter(|found| found.verdict == Verdict::Improvement);
         assert_eq!(improved.count(), 2);
         let worse = against(&case(&[("sides", 1)]), &baseline);
-        assert_eq!((worse.metric.as_str(), worse.note.as_str()), ("serial: sides", "here"));
+        assert_eq!(
+            (worse.metric.as_str(), worse.note.as_str()),
+            ("serial: sides", "the baseline's was not checked: here")
+        );
     }
 
     #[test]

@@ -80,8 +80,10 @@ pub static MEASURES: [Measure; 15] = [
         _ => Ok(s.against.time_s.value / s.run().time_s.value),
     }),
     measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rates().value / s.against.rates().value)),
-    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| Ok(peak(s.run()))),
-    measure("bytes_per_cell", Alone, PER_CELL, |s| Ok(s.run().bytes_per_cell().value)),
+    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| peak(s.run())),
+    measure("bytes_per_cell", Alone, PER_CELL, |s| {
+        peak(s.run()).and(Ok(s.run().bytes_per_cell().value))
+    }),
     measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),
     measure("time_per_cell_growth", Series, PLAIN, |s| Ok(growth(s.runs))),
     measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run())),
@@ -108,7 +110,11 @@ impl Measure {
     /// A value with its unit.
     pub fn show(&self, value: f64) -> String {
         let (factor, decimals, unit) = self.unit;
-        format!("{:.decimals$}{unit}", value * factor)
+        let value = value * factor;
+        // At least two digits.
+        let small = if value == 0.0 { 0.0 } else { 1.0 - value.abs().log10().floor() };
+        let decimals = decimals.max(small as usize);
+        format!("{value:.decimals$}{unit}")
     }
 
     /// Whether it is an efficiency, which is 1 if nothing is lost.
@@ -127,8 +133,9 @@ pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure
 }
 
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
-fn peak(run: &Group) -> f64 {
-    run.median_of(|run| Some(run.peak_rss_bytes.sum)).map_or(f64::NAN, |median| median.value)
+fn peak(run: &Group) -> Result<f64, String> {
+    let peak = run.median_of(|run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0));
+    peak.map(|median| median.value).ok_or("the program does not report its memory".to_owned())
 }
 
 fn lambda_cells(run: &Group) -> Result<f64, String> {
@@ -146,7 +153,7 @@ fn beyond(run: &Group, coarse: &Group) -> Result<f64, String> {
         let cells = grouped(coarse.cells());
         return Err(format!("the other run must have fewer cells, and has {cells}"));
     }
-    Ok((peak(run) - peak(coarse)) / (run.cells() - coarse.cells()) as f64)
+    Ok((peak(run)? - peak(coarse)?) / (run.cells() - coarse.cells()) as f64)
 }
 
 /// The greatest ratio of a time per cell to the least before it.
@@ -200,6 +207,13 @@ mod tests {
     }
 
     #[test]
+    fn values_have_at_least_two_digits() {
+        for (value, text) in [(0.0, "0.000 s"), (0.0004, "0.00040 s"), (12.3456, "12.346 s")] {
+            assert_eq!(named("seconds").show(value), text);
+        }
+    }
+
+    #[test]
     fn rates_are_per_core() {
         let two = timed(2, 4.0, 800);
         assert_eq!(value("cells_per_second_per_core", &[&two], None), Ok(100.0));
@@ -222,6 +236,11 @@ mod tests {
         assert_eq!(value("bytes_per_cell", &[&fine], None), Ok(0.7));
         assert_eq!(value("bytes_per_cell_beyond", &[&fine], Some(&coarse)), Ok(0.5));
         assert!(value("bytes_per_cell_beyond", &[&coarse], Some(&fine)).is_err());
+        // A program that does not report it is within no bound.
+        let unknown = with(1000, &[0.0, 0.0]);
+        for name in ["peak_bytes", "bytes_per_cell"] {
+            assert!(value(name, &[&unknown], None).unwrap_err().contains("does not report"));
+        }
         let alone = with(200, &[150.0]);
         assert!(value("bytes_per_cell_beyond", &[&fine], Some(&alone)).is_err());
     }

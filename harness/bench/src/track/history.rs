@@ -198,7 +198,11 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
                 same.metrics.extend(record.metrics);
                 same.accepted |= record.accepted;
             }
-            None => history.records.push(record),
+            None => {
+                // Without a time it follows the line before.
+                record.time = record.time.or(history.records.last().and_then(|last| last.time));
+                history.records.push(record);
+            }
         }
     }
     history.records.sort_by_key(|record| record.time);
@@ -268,7 +272,7 @@ mod tests {
         append(&path, &line).unwrap();
         let records = read(&path).unwrap().records;
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
-        assert_eq!(commits, ["f", "a", "b", "c", "e"]);
+        assert_eq!(commits, ["a", "b", "c", "e", "f"]);
         let line = serde_json::to_string(&record("f", &[])).unwrap();
         fs::write(&path, line.replace("null", "\"noon\"") + "\n").unwrap();
         let error = read(&path).unwrap_err();

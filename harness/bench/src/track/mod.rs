@@ -22,8 +22,17 @@ use std::collections::BTreeSet;
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
 /// Words in the names of metrics of which more is better. All others are costs.
-const GAINS: [&str; 8] =
-    ["per_second", "efficiency", "speed_up", "speedup", "throughput", "rate", "hold", "checks"];
+const GAINS: [&str; 9] = [
+    "per_s",
+    "per_second",
+    "efficiency",
+    "speed_up",
+    "speedup",
+    "throughput",
+    "rate",
+    "hold",
+    "checks",
+];
 
 /// Whether more of a metric is better; `None` if it is neither better nor worse.
 pub fn is_gain(name: &str) -> Option<bool> {
@@ -89,17 +98,20 @@ impl Series {
         }
     }
 
-    /// Whether a change is for the worse; `None` if it is neither better nor worse.
-    pub fn is_worse(&self, change: &Change) -> Option<bool> {
-        Some(is_gain(&self.name)? != (change.step.after > change.step.before))
+    /// Whether another value is worse; `None` if it is neither better nor worse.
+    pub fn is_worse(&self, old: f64, new: f64) -> Option<bool> {
+        Some(if is_gain(&self.name)? { new < old } else { new > old })
     }
 
-    /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
-    /// `recent`.
+    /// Returns the last change for the worse that was not accepted, whose first new value is among the last `recent`, and since which the
+    /// metric has not become as good as before.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
-        let last = self.changes.last()?;
-        let new = self.points.len() - last.step.at <= recent;
-        (new && !last.accepted && self.is_worse(last) == Some(true)).then_some(last)
+        let now = self.changes.last()?.step.after;
+        self.changes.iter().rfind(|Change { step, accepted, .. }| {
+            let is_worse = |new| self.is_worse(step.before, new) == Some(true);
+            let is_new = self.points.len() - step.at <= recent;
+            is_new && !accepted && is_worse(step.after) && is_worse(now)
+        })
     }
 }
 
@@ -112,6 +124,7 @@ fn plain(name: &str) -> &str {
 /// Returns the unit of a metric.
 pub fn unit(name: &str) -> &'static str {
     match plain(name) {
+        name if name.ends_with("per_s") => "count",
         name if name.ends_with("seconds") || name.ends_with("_s") => "s",
         name if name.ends_with("bytes") => "bytes",
         "instructions" => "instructions",
@@ -184,11 +197,25 @@ mod tests {
         let mut better = all[1].clone();
         better.changes[0].step.after = 1.0;
         assert!(better.worse_recently(10).is_none());
+        // A recovery that is not complete does not hide the change before it.
+        for (after, holds) in [(1050.0, false), (1000.0, true), (900.0, true)] {
+            let mut recovered = all[1].clone();
+            let mut second = recovered.changes[0].clone();
+            recovered.changes[0].step.before = 1000.0;
+            second.step = Step { at: 25, before: 1100.0, after, ..second.step };
+            recovered.changes.push(second);
+            assert_eq!(recovered.worse_recently(10).is_none(), holds, "{after}");
+        }
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
         // Of these, less is worse.
-        for gain in ["cells_per_second", "mpi-2/cells_per_second_per_core [2]", "speed_up", "hold"]
-        {
+        for gain in [
+            "cells_per_s",
+            "cells_per_second",
+            "mpi-2/cells_per_second_per_core [2]",
+            "speed_up",
+            "hold",
+        ] {
             let more = Series { name: format!("uav/{gain}"), ..all[1].clone() };
             let less = Series { name: more.name.clone(), ..better.clone() };
             assert!(

@@ -102,11 +102,16 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport> {
         let mut pairs = (0..).map(|at| [masked(&of_a, at), masked(&of_b, at)]);
         let [x, y] = pairs.find(|[x, y]| x != y).expect("the digests of the octant differ");
         let root = a.manifest.root;
-        let text = |word: Option<u64>| match word {
+        // Of two leaves apart, the other mesh lacks the first; what it has further on, both may have.
+        let is_apart = |x, y| word::key(x) >= word::key(y) + word::span(word::level(y));
+        let is_beyond = |x, y: Option<u64>| y.is_some_and(|y| is_apart(x, y));
+        let text = |word: Option<u64>, other| match word.filter(|&word| !is_beyond(word, other)) {
             Some(word) if without_sides.is_some() => root.place(word::octant(word)).to_string(),
-            _ => Named(word, root).to_string(),
+            Some(word) => Named(Some(word), root).to_string(),
+            None => "no leaf there".to_owned(),
         };
-        report.leaf = Some(format!("first difference:\n  A has {}\n  B has {}", text(x), text(y)));
+        report.leaf =
+            Some(format!("first difference:\n  A has {}\n  B has {}", text(x, y), text(y, x)));
         report.rule = without_sides.is_none().then(|| rule(&a, &b, case, [x, y]));
     }
     Ok(report)
@@ -219,10 +224,15 @@ mod tests {
                 "section 4 (side): give the case file (--case) to decide it"
             );
         }
+        // A mesh with a hole: what follows it is in both.
+        let fine = words_of(|o| o.level < 4);
+        let holed = written([&fine[..801], &fine[802..]].concat());
+        let found = diff(written(fine).path(), holed.path(), None).unwrap();
+        assert!(found.leaf.unwrap().ends_with("\n  B has no leaf there"));
         // A mesh that ends early.
         let (a, b) = (written(words.clone()), written(words[..511].to_vec()));
         let found = diff(a.path(), b.path(), None).unwrap();
-        assert!(found.leaf.unwrap().ends_with("\n  B has no more leaves"));
+        assert!(found.leaf.unwrap().ends_with("\n  B has no leaf there"));
     }
 
     #[test]

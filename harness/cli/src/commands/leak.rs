@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     write(arguments, &answers)?;
     if ends.is_empty() {
         println!(
-            "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it",
+            "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (one that is open at all three is not examined: --from)",
             case.name
         );
     }

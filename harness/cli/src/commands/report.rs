@@ -93,8 +93,11 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
         return Err(format!("no results to report: {place} has none; harness bench makes them"));
     }
     let written = report(directory, &lines).map_err(|error| error.to_string())?;
-    if lines.iter().all(|line| line.run().is_none()) {
-        return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
+    if lines.iter().all(|line| line.run().is_none_or(|run| run.warm_up)) {
+        return Err(format!(
+            "no repetition succeeded; {} lists the reasons",
+            written.page.display()
+        ));
     }
     written.notes.iter().for_each(|note| println!("{note}"));
     written.broken.iter().for_each(|(rule, why)| println!("rule {rule} broken: {why}"));

@@ -112,7 +112,7 @@ fn of_content(head: &[u8]) -> Option<Format> {
         let text = String::from_utf8_lossy(head);
         let is_words =
             ["<u8", ">u8"].iter().any(|kind| text.contains(&format!("'descr': '{kind}'")))
-                && text.contains(",), ");
+                && text.replace(' ', "").contains(",),");
         return Some(if is_words { Format::LeafWords } else { Format::Table });
     }
     // Binary data may follow XML in the same file.

@@ -30,7 +30,7 @@ impl Mesh {
         let note =
             format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");
         let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
-            let mut file = ListFile::create(dir, options, "labelList", object, note)?;
+            let mut file = ListFile::create(dir, options, ["labelList", object, note])?;
             file.labels(labels.len() as u64, labels)?;
             file.finish()
         };
@@ -45,11 +45,11 @@ impl Mesh {
             labels("rank", "", &mut ranks.iter().map(|&rank| rank.into()))?;
         }
         let ends = faces.vertices.ends.iter().map(|&end| end as i64);
-        let mut file = ListFile::create(dir, options, "faceCompactList", "faces", "")?;
+        let mut file = ListFile::create(dir, options, ["faceCompactList", "faces", ""])?;
         file.labels(count as u64 + 1, std::iter::once(0).chain(ends))?;
         file.labels(vertices, faces.vertices.corners.iter().map(|&point| point.into()))?;
         file.finish()?;
-        let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
+        let mut file = ListFile::create(dir, options, ["vectorField", "points", ""])?;
         file.list(points, self.points.all.iter().map(|at| to_user(at, &manifest.root)))?;
         file.finish()?;
         self.write_boundary(options.label, dir)
@@ -91,13 +91,7 @@ struct ListFile<'a> {
 
 impl<'a> ListFile<'a> {
     /// Begins a file.
-    fn create(
-        dir: &Path,
-        options: &'a Options<'a>,
-        class: &str,
-        object: &str,
-        note: &str,
-    ) -> Result<Self> {
+    fn create(dir: &Path, options: &'a Options, [class, object, note]: [&str; 3]) -> Result<Self> {
         let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
         out.write_all(header("binary", options.label, class, object, note).as_bytes())?;
         Ok(Self { out, options })

@@ -102,9 +102,7 @@ fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32)>
     let mut sets = Sets::new(leaves.count() as usize);
     leaves.walk(options, &mut |cell, _, squares| {
         let high = squares.iter().filter(|square| square.is_high);
-        for across in high.filter_map(|square| square.across.as_cell()) {
-            sets.union(cell, across);
-        }
+        high.filter_map(|square| square.across.as_cell()).for_each(|to| sets.union(cell, to));
         Ok(())
     })?;
     let of_cell: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
@@ -127,9 +125,7 @@ fn points(leaves: &Leaves, options: &Options) -> Result<Points> {
             points.add(std::array::from_fn(|a| low[a] + edge * (digit >> a & 1)));
         }
         let of_boundary = squares.iter().filter(|square| square.across.as_cell().is_none());
-        for corner in of_boundary.flat_map(|square| square.corners(true)) {
-            points.add(corner);
-        }
+        of_boundary.flat_map(|square| square.corners(true)).for_each(|at| _ = points.add(at));
         Ok(())
     })?;
     Ok(points)

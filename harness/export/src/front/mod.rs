@@ -121,12 +121,11 @@ pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary> {
     write(export, path, &|front, out| Ok(write_stl_binary(&triangles(front)?, out)?))
 }
 
+/// Writes the content of a file that shows a front.
+type Fill<'a> = &'a dyn Fn(&Front, &mut dyn Write) -> Result<()>;
+
 /// Finds the front, and writes the file that `fill` makes of it.
-fn write(
-    export: &Export<'_>,
-    path: &Path,
-    fill: &dyn Fn(&Front, &mut dyn Write) -> Result<()>,
-) -> Result<Summary> {
+fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
     export.mesh.require_sides()?;
     let faces = front(export)?;
     let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface";
@@ -198,9 +197,7 @@ impl Front {
     /// The front with these faces.
     fn new(root: Root, faces: Vec<Face>) -> Self {
         let (mut points, mut polygons) = (Points::default(), Polygons::default());
-        for corner in faces.iter().flat_map(Face::corners) {
-            points.add(corner);
-        }
+        faces.iter().flat_map(Face::corners).for_each(|corner| _ = points.add(corner));
         faces.iter().for_each(|face| polygons.push(&points, face.corners()));
         Self { root, faces, points, polygons }
     }

@@ -107,9 +107,7 @@ fn header(root: &Root, arrays: &[Array], pieces: &[Piece], digest: Digest, bytes
          <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
          </FieldData>\n"
     );
-    for piece in pieces {
-        describe(arrays, piece, &mut xml);
-    }
+    pieces.iter().for_each(|piece| describe(arrays, piece, &mut xml));
     let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
     let blanks = bytes.saturating_sub(xml.len() + end.len());
     xml + &" ".repeat(blanks) + end

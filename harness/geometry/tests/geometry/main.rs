@@ -238,15 +238,20 @@ fn edges_with_more_than_two_facets_are_even_or_odd() {
 }
 
 #[test]
-fn facets_without_area_have_no_effect() {
+fn facets_without_area_have_no_effect_unless_they_are_apart() {
     let mut facets = cube();
+    facets.push([facets[0][0], facets[0][1], facets[0][0]]);
+    facets.push([[facets[0][2]; 3], facets[0]].concat()[..3].try_into().unwrap());
+    assert_eq!(counts(&diagnosis(facets.clone(), Some(0.25))), vec![]);
     // A copy of one is no duplicate.
     facets.extend([[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]; 2]);
     facets.push([[9.0, 9.0, 9.0]; 3]);
     let found = diagnosis(facets, Some(0.25));
-    assert_eq!((counts(&found), found.facets - found.shells.facets), (vec![], 3));
+    let stray = vec![(Kind::Stray, 3)];
+    assert_eq!((counts(&found), found.facets - found.shells.facets), (stray, 5));
+    assert!(found.changes_region && found.finding(Kind::Stray).unwrap().count_changing == 3);
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
-    assert_eq!((counts(&point), point.shells.facets), (vec![], 0));
+    assert_eq!((counts(&point), point.shells.facets), (vec![(Kind::Stray, 1)], 0));
 }
 
 #[test]

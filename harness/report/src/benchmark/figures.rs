@@ -79,8 +79,7 @@ fn over_cells(
     let title = format!("{title}: {mesh}");
     let caption =
         format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
-    let x = Axis::log("cells");
-    let y = Axis::log(y);
+    let (x, y) = (Axis::log("cells"), Axis::log(y));
     let series = series(all, value);
     Figure { id, title, caption, x, y, series, ..Figure::default() }
 }

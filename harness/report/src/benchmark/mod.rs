@@ -15,8 +15,8 @@ use bench::experiments::group::Groups;
 use contract::failure::named;
 use contract::files::write_atomically;
 use numbers::{Number, numbers};
-use page::Broken;
 pub use page::machines;
+use page::{Broken, Drawn};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     check_invariants(&figures);
     let place = directory.join("figures");
     fs::create_dir_all(&place)?;
-    let drawn: Vec<(&Figure, String)> =
+    let drawn: Vec<Drawn> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
     let broken = page::broken(&groups, lines);
     let page = directory.join("index.html");
@@ -63,7 +63,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
 }
 
 /// Writes a figure in all formats; returns it with its SVG.
-fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<(&'a Figure, String)> {
+fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<Drawn<'a>> {
     let svg = svg::svg(figure);
     let path = |extension: &str| directory.join(format!("{}.{extension}", figure.id));
     write(&path("csv"), latex::csv(figure))?;

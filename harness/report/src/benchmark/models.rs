@@ -166,20 +166,17 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
         let [low, y, high] = model.run_s(&at, &of[0].network);
         Point { x: ranks, y, low, high }
     };
-    let line = (0..POINTS).map(modelled).collect();
     let fitted = model.fitted;
     let (seen, held_out): (Vec<_>, Vec<_>) =
         of.iter().partition(|group| group.setup.ranks as f64 <= fitted);
-    let points = |of: Vec<&&Group>| {
-        of.iter().map(|g| Point::exact(g.setup.ranks as f64, g.time_s.value)).collect()
+    let runs = |name: &str, style: usize, of: Vec<&&Group>| {
+        let points = of.iter().map(|g| Point::exact(g.setup.ranks as f64, g.time_s.value));
+        let runs = Series::new(name, Provenance::Projected, style, points.collect());
+        runs.drawn_as(crate::figure::Kind::Scattered)
     };
-    let series = vec![
-        Series::new("model and its band", Provenance::Modelled, 0, line),
-        Series::new("fitted runs", Provenance::Projected, 0, points(seen))
-            .drawn_as(crate::figure::Kind::Scattered),
-        Series::new("held-out runs", Provenance::Projected, 1, points(held_out))
-            .drawn_as(crate::figure::Kind::Scattered),
-    ];
+    let line = (0..POINTS).map(modelled).collect();
+    let line = Series::new("model and its band", Provenance::Modelled, 0, line);
+    let series = vec![line, runs("fitted runs", 0, seen), runs("held-out runs", 1, held_out)];
     let caption = format!(
         "Run time of {}, {} cells, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: laws of exact counters, and a cost of \
          each by phase. The band has the width that held 90 % of such predictions in retrospect. Projected with {}.",

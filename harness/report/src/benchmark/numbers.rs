@@ -14,7 +14,6 @@ use bench::experiments::group::{Group, Groups};
 use contract::number::{digits, grouped};
 use regex::{Captures, Match, Regex};
 use statistics::Median;
-use std::fmt::Write;
 
 /// A result, as it is printed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -91,8 +90,7 @@ pub fn tex(numbers: &[Number]) -> String {
     let mut out = HEAD.to_owned();
     for number @ Number { key, value, interval, coverage, .. } in numbers {
         let unit = unit_tex(number);
-        let _ =
-            writeln!(out, "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{coverage}}}{{{unit}}}");
+        out += &format!("\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{coverage}}}{{{unit}}}\n");
     }
     out
 }

@@ -9,13 +9,11 @@ use bench::experiments::group::Groups;
 use bench::order::distinct;
 use maud::html;
 
+/// A figure and its SVG document.
+pub type Drawn<'a> = (&'a Figure, String);
+
 /// The page; every figure is given with its SVG document.
-pub fn page(
-    groups: &Groups,
-    drawn: &[(&Figure, String)],
-    broken: &[Broken],
-    lines: &[Line],
-) -> String {
+pub fn page(groups: &Groups, drawn: &[Drawn], broken: &[Broken], lines: &[Line]) -> String {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
     let content = html! {
         p {

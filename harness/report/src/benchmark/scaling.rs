@@ -111,8 +111,7 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
     }
     let id = format!("speedup-{file}");
     let title = format!("Speedup: {subject}, {cells} cells");
-    let x = ranks_axis(all);
-    let y = Axis::log("speedup");
+    let (x, y) = (ranks_axis(all), Axis::log("speedup"));
     Figure { id, title, caption, x, y, series, ..Figure::default() }
 }
 
@@ -235,8 +234,7 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
     let names = simulated.iter().map(|g| g.setup.ranks.to_string()).collect();
     let id = format!("phases-{experiment}-{file}");
     let title = format!("Time by phase in {experiment} scaling: {subject}");
-    let x = Axis::linear(unit);
-    let y = Axis { names, ..Axis::linear("ranks") };
+    let (x, y) = (Axis::linear(unit), Axis { names, ..Axis::linear("ranks") });
     let series = labelled.enumerate().map(segment).collect();
     Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }

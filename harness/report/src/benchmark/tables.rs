@@ -51,9 +51,8 @@ fn experiment(groups: &Groups, name: &str) -> Table {
         let counted = group.typical.counters.get("leaves");
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
     };
-    let of_base = |group: &Group, value: f64| match groups.has_reference(group) {
-        true => format!("{value:.3}"),
-        false => "–".to_owned(),
+    let of_base = |group: &Group, value: f64| {
+        if groups.has_reference(group) { format!("{value:.3}") } else { "–".to_owned() }
     };
     let table = Table::of(
         name.to_owned(),

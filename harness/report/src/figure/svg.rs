@@ -221,10 +221,7 @@ fn text(text: &str, at: (i32, i32)) -> Text<'static, (i32, i32), String> {
 }
 
 /// The line of a series through points.
-fn path<'a, C: Clone + 'static>(
-    points: Vec<C>,
-    s: &Series,
-) -> DynElement<'static, SVGBackend<'a>, C> {
+fn path<'a, C: Clone + 'static>(at: Vec<C>, s: &Series) -> DynElement<'static, SVGBackend<'a>, C> {
     let (style, dashes) = match (s.kind, s.provenance) {
         (Kind::Line, _) | (_, Provenance::Measured | Provenance::Modelled) => (line(s.style), None),
         (_, Provenance::Bound) => (BLACK.stroke_width(3), Some((14, 10))),
@@ -232,8 +229,8 @@ fn path<'a, C: Clone + 'static>(
     };
     match dashes {
         _ if s.kind == Kind::Scattered => PathElement::new(Vec::new(), style).into_dyn(),
-        None => PathElement::new(points, style).into_dyn(),
-        Some((dash, gap)) => DashedPathElement::new(points, dash, gap, style).into_dyn(),
+        None => PathElement::new(at, style).into_dyn(),
+        Some((dash, gap)) => DashedPathElement::new(at, dash, gap, style).into_dyn(),
     }
 }
 

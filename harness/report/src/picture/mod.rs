@@ -60,8 +60,9 @@ const NO_LEAF: &str =
     "no leaf of the selection is in a slice: give another --slice or a larger --clip";
 
 /// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, normal to z through the root's
-/// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
-fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
+/// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail. One beyond the clip box is
+/// replaced by that through the box's centre.
+fn middle(root: &Root, body: Option<&[Facet]>, clip: Option<[[i64; 3]; 2]>) -> Slice {
     let extent = extent(root, body);
     let lengths = extent.extents();
     // Of equal extents the last one, so that a cube is seen from above. A plane within a flat body has no section.
@@ -73,6 +74,9 @@ fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
     let step = 10f64.powf(lengths[axis].log10().floor() - 3.0);
     let middle = if step > 0.0 { (middle / step).round() * step } else { middle };
     let within = middle.clamp(root.origin[axis], root.origin[axis] + root.edge);
+    let clip = clip.map(|clip| clip.map(|corner| root.to_user(corner)[axis]));
+    let beyond = clip.filter(|[low, high]| within < *low || within > *high);
+    let within = beyond.map_or(within, |[low, high]| (low + high) / 2.0);
     Slice::new(root, axis, within).expect("a coordinate in the root")
 }
 
@@ -122,16 +126,21 @@ impl Picture {
         if colour == Colour::Rank {
             mesh.require_ranks()?;
         }
-        let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
+        let clip = request.selection.clip;
+        let slice = request.selection.slice;
+        let slice = slice.unwrap_or_else(|| middle(&root, request.body, clip));
         let axes = plane_axes(slice.axis);
-        let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
+        let clip = clip.unwrap_or_else(|| {
+            let mut cube = zoomed(&root, request.body, request.zoom);
+            // The plane need not be in the cube.
+            (cube[0][slice.axis], cube[1][slice.axis]) = (0, UNITS_PER_EDGE);
+            cube
+        });
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
         let has_area = (0..2).all(|i| window[0][i] < window[1][i]);
         let why = "the clip box has no area in the plane of the slice: give a larger one";
         Failure::unless(has_area, why)?;
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
-        // The window may end within the root, but the plane need not be in the box.
-        (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
         let selection =
             Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
         let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));

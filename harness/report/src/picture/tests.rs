@@ -143,7 +143,7 @@ fn small_leaves_are_merged_and_the_greatest_value_counts() {
 #[test]
 fn a_clip_box_is_the_window() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
-    let clip = [[0.0, 0.0, 7.0], [4.0, 2.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
+    let clip = [[0.0, 0.0, 0.0], [4.0, 2.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
     let selection = Selection { clip: Some(clip), ..at(2, 1.0) };
     let shown = Request { selection, ..request(Colour::Level) };
     let picture = Picture::collect(&mesh, &shown).unwrap();

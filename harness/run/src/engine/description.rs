@@ -180,15 +180,14 @@ impl Description {
 
     /// Values of the placeholders for paths on this machine.
     pub fn places(&self, paths: &Paths) -> Values<'static> {
-        let text = |path: &Path| path.to_string_lossy().into_owned();
-        let target = paths.harness.parent().unwrap_or(Path::new("."));
-        Values::from([
-            ("here", text(&self.here)),
-            ("root", text(&paths.root)),
-            ("target", text(target)),
-            ("python", text(&paths.python)),
-            ("mpirun", text(&paths.mpirun)),
-        ])
+        let places = [
+            ("here", &*self.here),
+            ("root", &paths.root),
+            ("target", paths.harness.parent().unwrap_or(Path::new("."))),
+            ("python", &paths.python),
+            ("mpirun", &paths.mpirun),
+        ];
+        places.map(|(name, path)| (name, path.to_string_lossy().into_owned())).into()
     }
 
     /// Why the engine is not run on a case; `None` if it is.

@@ -7,6 +7,9 @@ use thiserror::Error;
 /// Exit code of mesher, reference and the readers in Python for an error in the user's input.
 pub const CODE_INPUT: i32 = 2;
 
+/// A result, or why a program gave none.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
 /// How a program failed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum End {

@@ -187,10 +187,8 @@ impl Launcher {
         set_environment(command);
         let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
         // In a job of Slurm, mpirun starts ranks on all of its nodes.
-        if !is_mpirun || self.words[1..] != ["-n", RANKS] || node_count() != 1 {
-            return None;
-        }
-        own_directory(command)
+        let is_local = is_mpirun && self.words[1..] == ["-n", RANKS] && node_count() == 1;
+        if is_local { own_directory(command) } else { None }
     }
 }
 

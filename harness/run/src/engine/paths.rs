@@ -75,18 +75,16 @@ impl Paths {
         let directory = harness.parent().unwrap_or(Path::new(".")).to_owned();
         let root = repository(&directory);
         let from_env = |name| env::var_os(name).map(PathBuf::from);
-        let or_else = |first: PathBuf, second: PathBuf| match !first.is_file() && second.is_file() {
-            true => second,
-            false => first,
+        let or_else = |first: PathBuf, second: PathBuf| {
+            if !first.is_file() && second.is_file() { second } else { first }
         };
         // In the target directory of the harness or, for a harness that was copied elsewhere, in that of the repository.
         let target = directory.parent().unwrap_or(Path::new("..")).to_owned();
         let built = |name| or_else(target.join(name), root.join("target").join(name));
+        let python = or_else(root.join(".venv/bin/python"), directory.join("python"));
         Self {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
-            python: from_env("HARNESS_PYTHON").unwrap_or_else(|| {
-                or_else(root.join(".venv/bin/python"), directory.join("python"))
-            }),
+            python: from_env("HARNESS_PYTHON").unwrap_or(python),
             p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| built("engines/p4est-balance")),
             proven_checker: from_env("HARNESS_PROVEN").unwrap_or_else(|| built("proof/check")),
             catalogue: Catalogue { path: root.join("geometries/catalogue.toml") },

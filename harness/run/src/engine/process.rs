@@ -123,9 +123,8 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
         let start = Instant::now();
         Ok((start, Session::start(command)?.0, [stdout, stderr]))
     };
-    let started = start();
     let (start, mut session, outputs) =
-        started.map_err(|error| cannot_be_started(command, &error))?;
+        start().map_err(|error| cannot_be_started(command, &error))?;
     let mut peak_rss_bytes = watch.sample_memory.then_some(0);
     let outputs = outputs.each_ref();
     let ended = watch.until(start, &outputs, || {

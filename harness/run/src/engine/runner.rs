@@ -1,7 +1,7 @@
 //! An engine: any program that meshes a case, ours included, run as its engine file describes; and the engines of a session.
 
 use super::description::{self, Description};
-use super::failure::{End, Failure};
+use super::failure::{End, Failure, Result};
 use super::layout::{Launcher, Layout, Ranks, RunOptions};
 use super::paths::{Input, Paths, on_path};
 use super::process::{self, Finished, Watch};
@@ -158,12 +158,7 @@ impl Engine {
     ///
     /// # Errors
     /// [`End::Missing`] if the engine file has no template for it.
-    pub fn command(
-        &self,
-        case: &Path,
-        layout: &Layout,
-        options: &RunOptions,
-    ) -> Result<Command, Failure> {
+    pub fn command(&self, case: &Path, layout: &Layout, options: &RunOptions) -> Result<Command> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut values = self.places.clone();
         values.extend([("program", text(&self.program)), ("case", text(case))]);
@@ -183,12 +178,7 @@ impl Engine {
     ///
     /// # Errors
     /// If the run fails, or its report cannot be used.
-    pub fn run(
-        &self,
-        case: &Path,
-        layout: &Layout,
-        options: &RunOptions,
-    ) -> Result<Completed, Failure> {
+    pub fn run(&self, case: &Path, layout: &Layout, options: &RunOptions) -> Result<Completed> {
         fs::create_dir_all(options.place).map_err(|error| named(options.place, &error))?;
         let mut command = self.command(case, layout, options)?;
         let mesh = self.mesh_path(options);
@@ -197,7 +187,7 @@ impl Engine {
         if let (Some(mesh), Some(_)) = (&mesh, self.description.run.format) {
             import::clear(options.place, mesh)?;
         }
-        let finished = self.execute(&mut command, layout.ranks, options)?;
+        let finished = self.drive(&mut command, layout.ranks, options)?;
         let written = mesh.as_deref().map(|mesh| {
             import::complete(&self.description, self.label(), &command, case, mesh, options)
         });
@@ -217,7 +207,7 @@ impl Engine {
         layout: &Layout,
         ungraded: bool,
         (place, limit): (&Path, Duration),
-    ) -> Result<PathBuf, Failure> {
+    ) -> Result<PathBuf> {
         let mesh = place.join("mesh");
         let plain = RunOptions { report: false, ..RunOptions::new(place, limit) };
         self.run(case, layout, &RunOptions { mesh: Some(&mesh), ungraded, ..plain })?;
@@ -276,17 +266,12 @@ impl Engine {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub fn read_mesh(&self, mesh: &Path) -> Result<LeafSet, Failure> {
+    pub fn read_mesh(&self, mesh: &Path) -> Result<LeafSet> {
         let unreadable = |error| format!("wrote a mesh that cannot be read: {error}");
         leafset::read(mesh).map_err(|error| self.unusable(unreadable(error)))
     }
 
-    fn execute(
-        &self,
-        command: &mut Command,
-        ranks: Ranks,
-        options: &RunOptions,
-    ) -> Result<Finished, Failure> {
+    fn drive(&self, command: &mut Command, ranks: Ranks, options: &RunOptions) -> Result<Finished> {
         let status = options.status_path();
         status.iter().try_for_each(fs::create_dir_all)?;
         let label = self.label();
@@ -302,9 +287,8 @@ impl Engine {
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
             services.send(&name, start, &words)?;
             let time_wall_s = services.answer(&name, &watch)?;
-            let stdout = watch.log("stdout");
             // The CPU time and the memory of a request are not measured.
-            let time_cpu_s = f64::NAN;
+            let (time_cpu_s, stdout) = (f64::NAN, watch.log("stdout"));
             return Ok(Finished { time_wall_s, time_cpu_s, stdout, peak_rss_bytes: None });
         }
         let _shared = self.launcher.prepare(command);

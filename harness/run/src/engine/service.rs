@@ -5,7 +5,7 @@
 //! code that these words would have given a process of their own. Errors are on the standard error. A program that ends or hangs
 //! instead costs that request, and the next one starts it again.
 
-use super::failure::{End, Failure};
+use super::failure::{End, Failure, Result};
 use super::interrupt;
 use super::process::{self, Watch};
 use super::session::{Session, end_all, wait_while};
@@ -53,7 +53,7 @@ impl Services {
     ///
     /// # Errors
     /// [`End::Missing`] if it cannot be started; another end if it has failed since the last answer.
-    pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), Failure> {
+    pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<()> {
         let failure = |end| Failure::new(name, end);
         let mut services = self.0.borrow_mut();
         if let Some(service) = services.get_mut(name) {
@@ -76,12 +76,7 @@ impl Services {
     ///
     /// # Errors
     /// As [`Self::start`].
-    pub fn send(
-        &self,
-        name: &str,
-        start: impl FnOnce() -> Start,
-        words: &[String],
-    ) -> Result<(), Failure> {
+    pub fn send(&self, name: &str, start: impl FnOnce() -> Start, words: &[String]) -> Result<()> {
         self.start(name, start)?;
         let mut services = self.0.borrow_mut();
         let service = services.get_mut(name).expect("it has been started");
@@ -96,7 +91,7 @@ impl Services {
     ///
     /// # Errors
     /// If the answer is not 0, or the service ends or hangs.
-    pub fn answer(&self, name: &str, watch: &Watch) -> Result<f64, Failure> {
+    pub fn answer(&self, name: &str, watch: &Watch) -> Result<f64> {
         let mut services = self.0.borrow_mut();
         let service = services.get_mut(name).expect("it was sent a request");
         let time_s = service.answer(watch);
@@ -166,10 +161,7 @@ impl Service {
         }
         match code? {
             0 => Ok(time_s),
-            code => {
-                let error = process::last_lines(&process::end_of(errors));
-                Err(End::Exited { code, error })
-            }
+            code => Err(End::Exited { code, error: process::last_lines(&process::end_of(errors)) }),
         }
     }
 }
@@ -181,11 +173,10 @@ fn lines_of(output: ChildStdout) -> io::Result<Receiver<String>> {
         let mut output = BufReader::new(output);
         let mut line = Vec::new();
         while output.by_ref().take(ANSWER_MAX).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
-            if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
-                return;
-            }
+            sender.send(String::from_utf8_lossy(&line).into_owned()).ok()?;
             line.clear();
         }
+        Some(())
     };
     thread::Builder::new().name("answers".into()).stack_size(64 << 10).spawn(read)?;
     Ok(lines)

@@ -75,13 +75,11 @@ impl Session {
     /// How the leader ended; `None` if it runs for longer than this.
     pub(super) fn wait(&mut self, limit: Duration) -> Result<Option<Ended>, End> {
         if self.ended.is_none() {
-            self.ended = match self.waited.recv_timeout(limit) {
-                Ok(ended) => Some(ended),
-                Err(RecvTimeoutError::Timeout) => None,
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(End::Unusable("could not be waited for".to_owned()));
-                }
-            };
+            let waited = self.waited.recv_timeout(limit);
+            if waited == Err(RecvTimeoutError::Disconnected) {
+                return Err(End::Unusable("could not be waited for".to_owned()));
+            }
+            self.ended = waited.ok();
         }
         Ok(self.ended)
     }

@@ -111,7 +111,7 @@ impl Templates {
             let seed = (key == "simulated").then_some("seed");
             let own: Vec<&str> = seed.into_iter().chain(needs_out.then_some("out")).collect();
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
-            check_known(key, words, &own)?;
+            check_known(key, &words.cloned().collect::<Vec<_>>(), &own)?;
             let has = |text: &str| template.iter().any(|word| word.contains(text));
             if key == "parallel" && !self.serve.is_empty() && !has("{program}") {
                 return Err("`serve` needs the word {program} in `parallel`".to_owned());
@@ -123,8 +123,8 @@ impl Templates {
                 ));
             }
         }
-        check_known("serve", self.serve.iter(), &[])?;
-        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of.iter(), &[key]))
+        check_known("serve", &self.serve, &[])?;
+        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of, &[key]))
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
@@ -141,8 +141,7 @@ impl Templates {
         mut values: Values,
     ) -> Result<Vec<String>, End> {
         let lacks = |what: &str, key: &str| {
-            let why = format!("cannot be {what}: its engine file has no `{key}` in [run]");
-            Err(End::Missing(why))
+            Err(End::Missing(format!("cannot be {what}: its engine file has no `{key}` in [run]")))
         };
         let (template, what, key) = match layout.ranks {
             Ranks::Serial => (&self.serial, "run", "serial"),
@@ -186,14 +185,10 @@ impl Templates {
 }
 
 /// Refuses placeholders of a template that have no value in it.
-fn check_known<'a>(
-    key: &str,
-    words: impl Iterator<Item = &'a String>,
-    own: &[&str],
-) -> Result<(), String> {
+fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<(), String> {
     let known = [&COMMON, own].concat();
-    let unknown = words.flat_map(|word| placeholders(word)).find(|name| !known.contains(name));
-    unknown.map_or(Ok(()), |name| {
+    let mut named = words.iter().flat_map(|word| placeholders(word));
+    named.find(|name| !known.contains(name)).map_or(Ok(()), |name| {
         let known = known.join(" ");
         Err(format!("`{key}` has the unknown placeholder {{{name}}}; known there are {known}"))
     })

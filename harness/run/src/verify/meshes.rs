@@ -237,14 +237,12 @@ impl CaseRun<'_> {
         }
         let mut hangs = 0;
         for layout in self.all.options.layouts(self.engine()) {
-            match self.verify_on(case, serial, &layout) {
-                Ok(()) => {}
-                Err(failure) if failure.is_interrupt() => return,
-                Err(failure) => {
-                    hangs += usize::from(matches!(failure.end, End::TimedOut { .. }));
-                    self.add_failure(&layout.to_string(), Some(&layout), &failure);
-                }
+            let Err(failure) = self.verify_on(case, serial, &layout) else { continue };
+            if failure.is_interrupt() {
+                return;
             }
+            hangs += usize::from(matches!(failure.end, End::TimedOut { .. }));
+            self.add_failure(&layout.to_string(), Some(&layout), &failure);
             if hangs >= HANGS_MAX {
                 return self.leave_out_ranks(&format!("{HANGS_MAX} runs of this case have hung"));
             }

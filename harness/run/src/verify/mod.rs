@@ -146,7 +146,6 @@ impl Workplace {
     /// If something else has that name, or the directory cannot be made.
     fn enter(&self, case: &str) -> Result<PathBuf> {
         let place = self.root.join(case);
-        let shown = place.display();
         if place.join(MARKER).is_file() {
             // What cannot be removed is in the way of the new directory.
             let _ = fs::remove_dir_all(&place);
@@ -156,7 +155,7 @@ impl Workplace {
             fs::write(place.join(MARKER), "")
         };
         let made = fs::create_dir(&place).and_then(mark);
-        made.map_err(|error| Failure::input(format!("{shown} cannot be made: {error}")))?;
+        made.map_err(|e| Failure::input(format!("{} cannot be made: {e}", place.display())))?;
         Ok(place)
     }
 

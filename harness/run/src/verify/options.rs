@@ -109,9 +109,8 @@ impl Options {
         if self.no_mpi || (self.ranks.is_none() && engine.run.parallel.is_empty()) {
             return Vec::new();
         }
-        let counts: BTreeSet<usize> =
-            self.ranks.as_deref().unwrap_or(&RANKS).iter().copied().collect();
-        counts.into_iter().collect()
+        let counts = self.ranks.as_deref().unwrap_or(&RANKS).iter().copied();
+        BTreeSet::from_iter(counts).into_iter().collect()
     }
 
     /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice

@@ -82,10 +82,7 @@ impl CaseRun<'_> {
     /// Chooses points, has the oracles classify them, and counts the votes.
     fn vote(&self, step: Step, case: &Case, base: &LeafSet) -> Result<Check, Failure> {
         let needs = &self.all.needs;
-        let most = match self.selected.size {
-            Some(Size::Small) => POINTS_OF_SMALL,
-            _ => POINTS,
-        };
+        let most = if self.selected.size == Some(Size::Small) { POINTS_OF_SMALL } else { POINTS };
         let sample = oracle::choose(case, &base.words, most, SEED);
         let asked: Vec<&str> = ORACLES.into_iter().filter(|of| !needs.lacks_oracle(of)).collect();
         let (mut answers, mut failures) = (Vec::new(), Vec::new());

@@ -146,6 +146,8 @@ fn contradictions_are_reported() {
         ("case = \"cube-small\"", "", "missing field"),
         ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
         ("at_least", "atleast", "unknown field"),
+        ("at_least", "at_most = nan\nat_least", "at_least and at_most are finite"),
+        ("at_least", "at_most = -1.0\nat_least", "at_least is not more"),
         ("name = \"growth\"", "name = \"rate\"", "two rows are called \"rate\""),
     ] {
         assert!(FILE.contains(from), "{from}");
