@@ -86,8 +86,8 @@ fn findings(
 fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<GateFinding> {
     let (metric, why) = (key(check), first_line(check));
     let noted = |verdict, note: String| GateFinding::noted(case, &metric, verdict, note);
-    let old = baseline.and_then(|report| report.checks.iter().find(|old| key(old) == metric));
-    let old = old.and_then(count);
+    let before = baseline.and_then(|report| report.checks.iter().find(|old| key(old) == metric));
+    let old = before.and_then(count);
     let Some(new) = count(check) else {
         let note = || format!("the baseline's is checked, and the candidate's is not: {why}");
         return (is_unchecked(check) && old.is_some()).then(|| noted(Verdict::Missing, note()));
@@ -101,7 +101,7 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
         None => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
         Some(_) if check.name == RUNS && old > Some(0) => {
             let who = if new > 0 { "neither program makes" } else { "the baseline does not make" };
-            noted(Verdict::Missing, format!("{who} a mesh: {why}"))
+            noted(Verdict::Missing, format!("{who} a mesh: {}", before.map_or(why, first_line)))
         }
         Some(_) if old.is_none() => {
             noted(verdict, format!("the baseline's was not checked: {why}"))
@@ -173,7 +173,7 @@ mod tests {
         assert!(all.iter().all(|finding| finding.compared == 0), "{all:?}");
         let worst = all.iter().max_by_key(|finding| finding.verdict).unwrap();
         assert_eq!(worst.verdict, Verdict::Missing);
-        assert!(worst.note.contains("the baseline does not make a mesh"), "{worst:?}");
+        assert_eq!(worst.note, "the baseline does not make a mesh: it crashes");
         let worse = against(&case(&[("layer", 7)]), &baseline);
         assert_eq!((worse.verdict, worse.compared), (Verdict::Regression, 0));
     }
