@@ -5,11 +5,11 @@ use proptest::array::uniform3;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use reference::octant::Side;
-use reference::{Case, Enclosed, Error, Keep, base_tree, mesh};
+use reference::{Case, Enclosed, Error, Keep, Leak, base_tree, mesh};
 use std::cell::Cell;
 use support::dense::{self, CROSSING, Dense, INSIDE};
 use support::leaves;
-use support::{ROOT_EDGE, UNIT, block_of_units, case, sides};
+use support::{ROOT_EDGE, UNIT, block, block_of_units, case, sides};
 use support::{RandomCase, cases, for_all};
 
 const FINEST: u32 = 4;
@@ -249,4 +249,43 @@ fn a_leak_makes_both_sides_flow() {
     let base = base_tree(&open).unwrap();
     assert_eq!((base.components.outside, base.components.inside, base.ambiguous), (0, 1, None));
     assert!(leaves(&base.words).iter().all(|leaf| leaf.side == CROSSING || leaf.side == INSIDE));
+}
+
+/// A block from 2.5 to 5.5 units with a hole from 3.25 to 4.75 in its upper face. Cells of one unit do not pass, and 8 of them are inside;
+/// cells of half a unit pass.
+#[test]
+fn a_region_that_is_closed_at_twice_the_spacing_has_leaked() {
+    let [low, high, from, to] = [10, 22, 13, 19].map(|quarters| quarters * UNIT / 4);
+    let closed = block([low; 3], [high; 3]);
+    let mut open = closed.clone();
+    open.retain(|facet| facet.iter().any(|vertex| vertex[2] != high));
+    for [x, y] in [
+        [[low, high], [low, from]],
+        [[low, high], [to, high]],
+        [[low, from], [from, to]],
+        [[to, high], [from, to]],
+    ] {
+        let at = |i: usize, j: usize| [x[i], y[j], high];
+        open.extend([[at(0, 0), at(1, 0), at(1, 1)], [at(0, 0), at(1, 1), at(0, 1)]]);
+    }
+    let unit = UNIT as f64;
+    let leak = Leak {
+        spacing_coarse: unit,
+        spacing_fine: unit / 2.0,
+        volume: 8.0 * unit.powi(3),
+        point: [3.5 * unit; 3],
+    };
+    let outside = || vec![[unit / 5.0; 3]];
+    let leaks = |facets: &[[[i64; 3]; 3]], level, keep, seeds| {
+        mesh(&Case { keep, seeds, ..case(facets, level) }).unwrap().leaks
+    };
+    assert_eq!(leaks(&open, 4, Keep::Outside, vec![]), [leak.clone()]);
+    assert_eq!(leaks(&open, 4, Keep::Outside, outside()), [leak.clone()]);
+    // The flow of a seed in the hole's region was meant to be there.
+    let seeds = [outside(), vec![[3.6 * unit; 3]]].concat();
+    assert_eq!(leaks(&open, 4, Keep::Outside, seeds), []);
+    assert_eq!(leaks(&open, 3, Keep::Outside, outside()), []);
+    assert_eq!(leaks(&closed, 4, Keep::Outside, outside()), []);
+    let [two] = &leaks(&open, 5, Keep::Outside, vec![])[..] else { panic!("one is closed") };
+    assert_eq!(*two, Leak { spacing_fine: unit / 4.0, ..leak });
 }
