@@ -87,14 +87,17 @@ def csv(path, request):
 
 def named_in(comments, count):
     """The names of this many columns that a comment states, if one does. Refuses comments that state another order than x y z level in another form."""
-    for words in (comment.lstrip("#").split() for comment in reversed(comments)):
-        if len(words) == count and {"x", "y", "z"} <= {word.lower() for word in words}:
+    stated = [words for words in (comment.lstrip("#").split() for comment in comments) if len(words) == count]
+    for words in reversed(stated):
+        if {"x", "y", "z"} <= {word.lower() for word in words}:
             return words
     for comment in comments:
         order = [word for word in re.findall(r"[a-z]+", comment.lower()) if word in ("x", "y", "z", "level", "edge")]
         if {"x", "y", "z"} <= set(order) and order[:4] not in (["x", "y", "z"], ["x", "y", "z", "level"]):
             raise Refused(f"has a comment that is no list of {count} names: {comment}. Give one word per column, such as # {' '.join(order)}")
-    return None
+    # Other names, which are refused, if they are all that the last comment says.
+    last = comments[-1].lstrip("#").split() if comments else []
+    return last if last in stated and not any(map(is_number, last)) else None
 
 
 def is_number(field):
