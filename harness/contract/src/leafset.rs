@@ -45,9 +45,11 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>> {
     let names = part_names(dir)?;
     let why = Failure::about(dir, "it has neither mesh.json nor an array of leaves");
     Failure::unless(!names.is_empty(), why)?;
-    // The names of the mesher tell how many there were.
+    // The numbers in the names of the mesher show how many there were.
     let last = part_name(names.len() - 1);
-    let is_number = |name: &str| name.as_bytes()[7..12].iter().all(u8::is_ascii_digit);
+    let is_number = |name: &str| {
+        name.starts_with("leaves-") && name.as_bytes()[7..12].iter().all(u8::is_ascii_digit)
+    };
     let is_beyond = |name: &String| name.len() == last.len() && *name > last && is_number(name);
     let why =
         Failure::about(dir, format!("a part is missing: the last of {} is {last}", names.len()));
@@ -151,8 +153,11 @@ mod tests {
             npy::write(&dir.path().join(part_name(index)), &[7]).unwrap();
             assert_eq!(read_parts(dir.path()).is_ok(), is_whole, "{index}");
         }
-        npy::write(&dir.path().join("leaves-outer.npy"), &[7]).unwrap();
-        assert_eq!(read_parts(dir.path()).unwrap().len(), 4);
+        for name in ["leaves-outer.npy", "surface00009.npy"] {
+            npy::write(&dir.path().join(name), &[7]).unwrap();
+        }
+        assert_eq!(read_parts(dir.path()).unwrap().len(), 5);
+        fs::remove_file(dir.path().join("surface00009.npy")).unwrap();
         fs::remove_file(dir.path().join(part_name(0))).unwrap();
         fs::remove_file(dir.path().join("leaves-outer.npy")).unwrap();
         let why = read_parts(dir.path()).unwrap_err().to_string();

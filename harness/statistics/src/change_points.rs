@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn one_other_value_of_an_exact_series_is_no_step_and_two_are_one() {
+    fn one_other_value_of_an_exact_series_is_no_step_and_five_are_one() {
         for n in [10, 40, 50, 100] {
             let changed = |from: usize, to: usize| -> Vec<(usize, f64, f64)> {
                 let value = |i| if (from..to).contains(&i) { 1500.0 } else { 1374.0 };
