@@ -4,7 +4,7 @@
 //! Invariants, executed by `Expected::check_invariants` before anything is written or printed: a quantity of a run is there once; a band
 //! contains its value. Verdicts are not stored: they follow from both values.
 
-use crate::experiments::entry::{Line, Run};
+use crate::experiments::entry::{Line, Run, Setup};
 use crate::experiments::group::{Group, Groups};
 use crate::study::judge::of_last_origin;
 use contract::failure::{Failure, Result};
@@ -32,6 +32,9 @@ pub struct Expected {
     pub seconds_once: f64,
     /// The values, run by run.
     pub values: Vec<Value>,
+    /// The runs.
+    #[serde(skip)]
+    setups: Vec<Setup>,
 }
 
 /// A quantity of a run.
@@ -84,10 +87,12 @@ impl Expected {
         let longest =
             |group: &Group| group.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
         let seconds_once = warm_ups.chain(groups.all.iter().map(longest)).sum();
-        let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
+        let named = |group: &Group| values(group.setup.to_string(), &groups, group);
+        let values = groups.all.iter().flat_map(named).collect();
+        let setups = groups.all.iter().map(|group| group.setup.clone()).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
-        let expected = Self { schema, commit, seconds, seconds_once, values };
+        let expected = Self { schema, commit, seconds, seconds_once, values, setups };
         expected.check_invariants();
         Ok(expected)
     }
@@ -121,10 +126,21 @@ impl Expected {
         assert!(self.seconds_once <= self.seconds + 1e-6, "one run takes longer than all");
     }
 
+    /// The name of the run that a run repeats: one of another spacing, too, as programs of other meshes come to another one for a number of cells.
+    fn name(&self, of: &Setup) -> String {
+        let repeats = |setup: &&Setup| {
+            let is_close = (0.71..1.41).contains(&(setup.spacing_min / of.spacing_min));
+            is_close && Setup { spacing_min: of.spacing_min, ..(*setup).clone() } == *of
+        };
+        let same = self.setups.iter().find(|setup| *setup == of);
+        same.or_else(|| self.setups.iter().find(repeats)).unwrap_or(of).to_string()
+    }
+
     /// Compares with a record of the repetition.
     pub fn compare(&self, lines: &[Line]) -> Replayed {
         let groups = Groups::of(lines);
-        let all: Vec<Value> = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
+        let named = |group: &Group| values(self.name(&group.setup), &groups, group);
+        let all: Vec<Value> = groups.all.iter().flat_map(named).collect();
         let row = |expected: &Value| {
             let Value { run, quantity, .. } = expected;
             let measured = all.iter().find(|of| (&of.run, &of.quantity) == (run, quantity));
@@ -200,10 +216,9 @@ impl Replayed {
     }
 }
 
-/// The values of a group.
-fn values(groups: &Groups, group: &Group) -> Vec<Value> {
-    let (run, first) = (group.setup.to_string(), &group.runs[0]);
-    let mut all = Vec::new();
+/// The values of a group, whose run is called `run`.
+fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
+    let (first, mut all) = (&group.runs[0], Vec::new());
     let mut add = |quantity: &str, found: Found| {
         let (run, quantity) = (run.clone(), quantity.to_owned());
         all.push(Value { run, quantity, found });
@@ -322,6 +337,24 @@ mod tests {
         assert_eq!((replayed.count(Verdict::Outside), replayed.holds()), (3, false));
         let missing = expected.compare(&record([2.0, 2.0])[..1]);
         assert_eq!(missing.count(Verdict::Missing), 8);
+    }
+
+    /// Otherwise the other mesh would be missing.
+    #[test]
+    fn another_spacing_for_the_same_number_of_cells_is_another_mesh() {
+        let finer = |run: &mut Run| {
+            run.setup.spacing_min *= 0.9;
+            run.cells += 1;
+        };
+        let [near, far] = [0.9, 0.5].map(|by| {
+            expected().compare(&edited(|run| {
+                finer(run);
+                run.setup.spacing_min *= by;
+            }))
+        });
+        let counts =
+            [Verdict::Differs, Verdict::Missing].map(|v| [&near, &far].map(|r| r.count(v)));
+        assert_eq!(counts, [[2, 0], [0, expected().values.len()]]);
     }
 
     #[test]

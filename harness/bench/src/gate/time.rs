@@ -154,8 +154,9 @@ impl Quantity {
         let Comparison { low, high, p, floor, visible, .. } = self.found;
         let visible = visible.max(rules.effect_min / 100.0);
         let [low, high, floor, visible] = [low, high, floor, visible].map(|ratio| ratio * 100.0);
+        let p = if p < 0.001 { format!("{p:.0e}") } else { format!("{p:.3}") };
         let mut note = format!(
-            "{} rounds; 99 % interval {low:+.1} to {high:+.1} %, p = {p:.5} among all times; noise floor {floor:.1} %, minimum \
+            "{} rounds; 99 % interval {low:+.1} to {high:+.1} %, p = {p} among all times; noise floor {floor:.1} %, minimum \
              detectable effect {visible:.1} %",
             self.rounds.len()
         );

@@ -40,6 +40,7 @@ pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8> {
     let case = source.read_case()?;
     let [of_a, of_b] = [source.open(a, case.as_ref())?, source.open(b, case.as_ref())?];
     let report = diff::diff(&of_a.dir, &of_b.dir, case.as_ref()).map_err(Failure::input)?;
+    Failure::unless(report.leaves > 0 || !report.same_leaves(), "neither mesh has a leaf")?;
     println!("A {}\nB {}\n{report}", a.display(), b.display());
     let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
     Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED })
