@@ -36,6 +36,7 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
         command: "mesher".into(),
         program: String::new(),
         facets: 12,
+        inputs: String::new(),
         geometry: None,
         cells,
         digest: "0".repeat(32),

@@ -32,6 +32,8 @@ pub enum Kind {
     ThinWalls,
     /// Facets with an opposite facet less than one cell away, on the outer side.
     ThinGaps,
+    /// Facets with a coordinate near which f32 numbers are more than half a cell apart.
+    Rounded,
     /// Facets with a point beyond the root.
     OutsideRoot,
     /// Facets within the root with a point on its boundary.
@@ -96,7 +98,8 @@ impl Kind {
     /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
-            Self::NonManifoldOdd | Self::Stray | Self::Duplicates | Self::OutsideRoot => true,
+            Self::NonManifoldOdd | Self::Stray | Self::Duplicates => true,
+            Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -127,12 +130,26 @@ impl Kind {
                 "No cell fits into the wall: it consists of crossing leaves, without an inside."),
             Self::ThinGaps => ("facets at thin gaps",
                 "No cell fits into the gap, so no flow passes. The wedge along the line where two shells intersect is a gap, too."),
+            Self::Rounded => ("facets with rounded vertices",
+                "Coordinates are f32 numbers, which are more than half a cell apart so far from the origin: the body has steps. Move it to the origin before its vertices are rounded."),
             Self::OutsideRoot => ("facets beyond the root",
                 "The root cuts the body, whose facets beyond it rays still count. Enlarge the root if the body is to be meshed whole."),
             Self::TouchingRoot => ("facets on the root's boundary",
                 "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there."),
         }
     }
+}
+
+/// Facets with a coordinate near which f32 numbers are more than half a cell apart.
+pub fn rounded(input: &Input, cell: f64, first: usize) -> Finding {
+    let mut finding = Finding::new(Kind::Rounded);
+    for (facet, corners) in (0..).zip(&input.case.facets) {
+        let far = corners.as_flattened().iter().fold(0f32, |far, c| far.max(c.abs()));
+        if f64::from(far.next_up() - far) > cell / 2.0 {
+            finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
+        }
+    }
+    finding
 }
 
 /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.

@@ -38,6 +38,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, &shells, cell));
+        findings.push(finding::rounded(input, cell, first));
     }
     findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {

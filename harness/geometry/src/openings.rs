@@ -19,11 +19,21 @@ use super::tree::Point;
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
 const TOLERANCE: f64 = 2.0;
 
-/// All openings, widest first: a hole, the rim of a sheet, or several that share a vertex.
+/// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex.
 pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     let open = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0]);
     let tolerance = TOLERANCE * input.case.root.edge / UNITS_PER_EDGE as f64;
-    let rims = uncancelled(open.collect(), &edges.points, tolerance);
+    let (low, edge) = (input.case.root.origin, input.case.root.edge);
+    let mut rims = uncancelled(open.collect(), &edges.points, tolerance);
+    // Where the root cuts a body, its boundary closes the body.
+    rims.retain(|rim| {
+        let ends = rim.ends.map(|v| edges.points[v as usize]);
+        let is_beyond = |a: usize| {
+            let at = ends.map(|end| end[a] - low[a]);
+            at.iter().all(|at| *at <= tolerance) || at.iter().all(|at| *at >= edge - tolerance)
+        };
+        !(0..3).any(is_beyond)
+    });
     let mut places = places(&rims, &edges.points);
     let width = |place: &Place| place.width.unwrap_or(0.0);
     places.sort_by(|a, b| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));

@@ -149,18 +149,22 @@ pub fn junit(report: &Report) -> String {
     xml.add_test_suites(report.cases.iter().map(of_case));
     // A missing program that `--require` names fails the build, so it is an error here too.
     let required = report.missing.iter().filter(|missing| missing.required);
-    let required = required.map(|one| test(&one.what, unsuccessful(Error, &one.why), ""));
+    let required = required.map(|one| (&*one.what, &*one.why));
+    let required = required.chain(report.interrupted.then_some(("all cases", "interrupted")));
+    let required = required.map(|(what, why)| test(what, unsuccessful(Error, why), ""));
     let required = Some(suite("required", 0.0, required)).filter(|suite| suite.tests > 0);
     xml.add_test_suites(required);
     check_junit(&xml, report);
     to_text(&xml)
 }
 
-/// Each check is a test, and so is each input that was refused and each requirement that is missing: these are errors.
+/// Each check is a test, and so is each input that was refused and each requirement that is missing, and an interrupt: these are errors.
 fn check_junit(xml: &quick_junit::Report, report: &Report) {
     let Tally { pass, fail, left_out } = report.tally();
     let refused = report.cases.iter().filter(|case| case.input_error.is_some()).count();
-    let errors = refused + report.missing.iter().filter(|missing| missing.required).count();
+    let errors = usize::from(report.interrupted)
+        + refused
+        + report.missing.iter().filter(|missing| missing.required).count();
     let expected = (pass + fail + left_out + errors, fail, errors);
     assert_eq!((xml.tests, xml.failures, xml.errors), expected, "tests, failures, errors of JUnit");
 }

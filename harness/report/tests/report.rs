@@ -76,6 +76,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             oversubscribed: comm == Comm::Mpi && ranks > 2,
             command: "mesher uav.toml".into(),
             program: String::new(),
+            inputs: String::new(),
             geometry: None,
             facets: 1000,
             cells,

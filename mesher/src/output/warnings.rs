@@ -2,8 +2,8 @@
 
 use crate::Mesh;
 use crate::input::lattice::{ExtentBox, Keep, Rules};
-use crate::sides::Summary;
 use crate::sides::leaks::Leak;
+use crate::sides::{Ambiguous, Summary};
 use bricks::octant::ROOT_EDGE;
 
 const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
@@ -32,8 +32,15 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
         (!mesh.rules.boxes.iter().all(has_effect), BOXES_WITHOUT_EFFECT),
         (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
     ];
+    let Ambiguous { count, example } = summary.ambiguous;
+    let ambiguous = example.map(|[x, y, z]| {
+        format!(
+            "the rays of {count} components disagree, for example at ({x}, {y}, {z}), so their sides are those of the majority: close \
+             holes and remove single sheets there, or give seeds if the root cuts the geometry on purpose"
+        )
+    });
     let others = others.into_iter().filter(|other| other.0).map(|other| other.1.to_owned());
-    leaks.into_iter().chain(empty).chain(others).collect()
+    leaks.into_iter().chain(empty).chain(ambiguous).chain(others).collect()
 }
 
 /// The warning of a geometry that leaks, or that is open and bounds nothing.

@@ -9,6 +9,7 @@
 //! has at least half of the requested cells; an overshooting mesh would cost more than the requested one. A large mesh is then
 //! extrapolated. Small ones grow unevenly, as levels begin, so that one is searched between its neighbours.
 
+use super::machine::digest_of;
 use crate::read_toml;
 use contract::case::Case;
 use contract::failure::{Failure, Result};
@@ -30,6 +31,8 @@ pub struct Base {
     pub spacing_min: f64,
     /// n of the unchanged case.
     pub layer_cells_min: u32,
+    /// Digest of the rules and the geometry of the unchanged case.
+    pub inputs: String,
     table: Table,
     root: Root,
     directory: PathBuf,
@@ -59,7 +62,8 @@ impl Base {
             fs::write(&path, of_file.to_string()).map_err(|error| Failure::at(&path, error))?;
             (case, table) = (Case::read(&path)?, PlainCase::read(&path)?.table);
         }
-        let stl = place.join(format!("{stem}.stl"));
+        let [rules, stl] = ["rules", "stl"].map(|kind| place.join(format!("{stem}.{kind}")));
+        fs::write(&rules, table.to_string()).map_err(|error| Failure::at(&rules, error))?;
         File::create(&stl)
             .and_then(|file| geometries::write_stl_binary(&case.facets, BufWriter::new(file)))
             .map_err(|error| Failure::at(&stl, error))?;
@@ -69,6 +73,7 @@ impl Base {
             stem,
             spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
             layer_cells_min: case.layer_cells_min,
+            inputs: digest_of([rules, stl]),
             table,
             root: case.root,
             directory: place.to_owned(),

@@ -338,6 +338,9 @@ pub struct Run {
     /// Digest of the facets as the program read them, if it reports one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<String>,
+    /// Digest of the rules and the geometry of the case from which the run's case was derived; empty in older records.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub inputs: String,
     /// Leaves of the mesh.
     pub cells: u64,
     /// The mesh's digest.
@@ -359,7 +362,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it has ranks, at most a million, and a wall time, which is at most that of the launcher and at least that of any phase;
+    /// Whether it has cells; ranks, at most a million, of which all values are stored, or none; and a wall time, which is at most that of the launcher and at least that of any phase;
     /// times that a clock can show; and sums that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
@@ -369,6 +372,7 @@ impl Run {
             phases.iter().flat_map(|p| [&p.useful_s, &p.wall_s, &p.messages, &p.message_bytes]);
         let mut spreads =
             of_phases.chain(self.counters.values()).chain([useful_s, &self.peak_rss_bytes]);
+        let is_of_all = |of: &Spread| of.by_rank.is_empty() || of.by_rank.len() == setup.ranks;
         let is_by_rank = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
         let off = rounding(setup.ranks * phases.len(), total);
@@ -378,7 +382,8 @@ impl Run {
             && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
             && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)
             && are_times(times.chain(of_run))
-            && spreads.all(Spread::is_possible)
+            && self.cells > 0
+            && spreads.all(|of| of.is_possible() && is_of_all(of))
             && (phases.is_empty() || !is_by_rank || (useful_s.sum - total).abs() <= off)
     }
 }

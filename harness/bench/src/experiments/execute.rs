@@ -77,6 +77,7 @@ impl Runner<'_> {
             command: shown(&command),
             facets: report.facets,
             geometry: report.geometry.map(|geometry| geometry.digest),
+            inputs: String::new(),
             cells: report.cells,
             time_wall_s,
             time_launch_s: finished.time_wall_s,

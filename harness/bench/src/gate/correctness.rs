@@ -101,7 +101,8 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
         None => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
         Some(_) if check.name == RUNS && old > Some(0) => {
             let who = if new > 0 { "neither program makes" } else { "the baseline does not make" };
-            noted(Verdict::Missing, format!("{who} a mesh: {}", before.map_or(why, first_line)))
+            let why = before.filter(|old| old.failed()).map_or(why, first_line);
+            noted(Verdict::Missing, format!("{who} a mesh: {why}"))
         }
         Some(_) if old.is_none() => {
             noted(verdict, format!("the baseline's was not checked: {why}"))

@@ -257,8 +257,11 @@ impl Study {
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
         let of_series = self.series.iter().map(|series| &series.case);
+        // In the names of results, punctuation is the same.
+        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         for case in of_series.chain(self.mesh.values().map(|mesh| &mesh.case)) {
-            let other = *cases.entry(Path::new(case).file_stem()).or_insert(case);
+            let name = Path::new(case).file_stem().map(|name| plain(&name.to_string_lossy()));
+            let other = *cases.entry(name).or_insert(case);
             let why = format!("the cases {other} and {case} have the same name: rename one");
             refuse(&[(other != case, &why)])?;
         }
@@ -379,7 +382,7 @@ impl Series {
     }
 
     fn check(&self) -> Result<(), String> {
-        use Experiment::{Layers, Weak, Weights};
+        use Experiment::{Layers, Spacing, Weak, Weights};
         let (what, ranks) = (self.experiment, [&self.sim[..], &self.mpi].concat());
         let is_about_ranks = matches!(what, Weak | Weights);
         let wrong = [
@@ -387,6 +390,10 @@ impl Series {
             (self.repeats == 0, "repeats is at least 1"),
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
+            (
+                what == Spacing && !self.cells.iter().any(|n| *n >= 4e5),
+                "give cells of 4e5 or more, for two spacings",
+            ),
             (what == Weak && self.cells.is_empty(), "give the cells of a rank"),
             (what != Weak && self.facets.is_some(), "facets per rank are for weak"),
             (self.facets.is_some_and(|n| !FACETS.contains(&n)), "facets is from 1 to 1e8"),

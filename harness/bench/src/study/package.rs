@@ -1,11 +1,16 @@
 //! A study with its cases, geometries and engines in one directory, so that it can be executed elsewhere.
 
 use super::Study;
-use crate::read_toml;
+use super::file::Series;
+use super::judge::of_last_origin;
+use crate::experiments::cases::Base;
+use crate::experiments::entry::Line;
+use crate::{name_of, read_toml};
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
 use run::engine::paths::Paths;
 use run::engine::runner::Engine;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use toml::{Table, Value};
@@ -53,6 +58,34 @@ pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<()> {
     put(&out.join(STUDY), table.to_string().as_bytes())
 }
 
+/// Requires that a study made a record: that it asks for all of its runs, and that the last of them were of the cases and geometries that it names.
+///
+/// # Errors
+/// One sentence with a run of another study, or with a case that is not the same.
+pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<()> {
+    if let Some(setup) = lines.iter().find_map(|line| study.unasked(line)) {
+        let why = "the record has a run that the study does not ask for";
+        return Err(Failure::input(format!("{why}, {setup}: give the study that made it")));
+    }
+    let (place, mut known) = (tempfile::tempdir()?, BTreeMap::new());
+    let last = of_last_origin(lines);
+    for run in last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty()) {
+        let s = &run.setup;
+        let is_of = |of: &&Series| name_of(&of.experiment) == s.experiment && of.name() == s.case;
+        let (case, per_rank) = match study.series.iter().find(is_of) {
+            Some(of) => (&of.case, of.facets.map(|facets| [facets, s.ranks])),
+            None => (&study.mesh[&s.case].case, None),
+        };
+        if !known.contains_key(&(case, per_rank)) {
+            let path = paths.catalogue.case_file(case, &study.directory)?;
+            known.insert((case, per_rank), Base::read(&path, per_rank, place.path())?.inputs);
+        }
+        let why = format!("{case}: rules or geometry are not those of the record's runs");
+        Failure::unless(known[&(case, per_rank)] == run.inputs, why)?;
+    }
+    Ok(())
+}
+
 /// Copies an engine file with the program and the scripts beside it. What it runs from elsewhere is of the machine.
 fn copy_engine(path: &Path, paths: &Paths, out: &Path) -> Result<()> {
     copy(path, &out.join(file_name(path)))?;
@@ -84,7 +117,10 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
 fn put(path: &Path, bytes: &[u8]) -> Result<()> {
     match fs::read(path) {
         Ok(before) if before == bytes => return Ok(()),
-        Ok(_) => return Err(Failure::about(path, "two files have this name: rename one")),
+        Ok(_) => {
+            let why = "two files of the study have this name: rename one";
+            return Err(Failure::input(format!("{}: {why}", file_name(path))));
+        }
         Err(_) => {}
     }
     write_atomically(path, |out| out.write_all(bytes)).map_err(|error| Failure::at(path, error))
@@ -112,7 +148,7 @@ mod tests {
         put("ball.toml", "spacing_min = 0.1\n[generator]\nshape = \"sphere\"\nfacets = 80\n");
         put(
             "s.toml",
-            "[[series]]\nexperiment = \"strong\"\ncase = \"a wing.toml\"\n[[series]]\nexperiment = \"spacing\"\ncase = \"a wing.toml\"\n\
+            "[[series]]\nexperiment = \"strong\"\ncase = \"a wing.toml\"\n[[series]]\nexperiment = \"spacing\"\ncase = \"a wing.toml\"\ncells = [1e6]\n\
              [mesh.ball]\ncase = \"ball.toml\"\n",
         );
         package(&here.join("s.toml"), &paths(place.path()), &there).unwrap();

@@ -59,6 +59,8 @@ const NO_LAUNCHER: &str = "the launcher is missing";
 struct Planned {
     setup: Setup,
     case: PathBuf,
+    /// [`Base::inputs`] of the case from which it is derived.
+    inputs: String,
     repeats: usize,
     /// Whether an uncounted run of its mesh comes first.
     warm_up: bool,
@@ -252,7 +254,8 @@ impl Session<'_> {
                         let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
                         let setup = Setup { weights, partitioner, ..of_mesh.clone() };
                         let repeats = self.options.repeats(series.repeats);
-                        Planned { setup, case: case.clone(), repeats, warm_up: true, failed: false }
+                        let (case, inputs) = (case.clone(), base.inputs.clone());
+                        Planned { setup, case, inputs, repeats, warm_up: true, failed: false }
                     }));
                 }
             }
@@ -286,7 +289,8 @@ impl Session<'_> {
         let case = base.write(spacing, n, mesh.cells.is_none())?;
         let repeats = self.options.repeats(spec.repeats);
         let setup = spec.setup(spacing, n);
-        Ok(Planned { setup, case, repeats, warm_up: repeats > 1, failed: false })
+        let inputs = base.inputs;
+        Ok(Planned { setup, case, inputs, repeats, warm_up: repeats > 1, failed: false })
     }
 
     /// Returns a case, with facets for each of some ranks if they are given; writes its geometry as a binary STL file, once.
@@ -393,7 +397,10 @@ impl Session<'_> {
         (self.progress)(&format!("{s}, {which}"));
         let run = self.runner.run(s, &point.case, repeat);
         match run.and_then(|run| self.check_mesh(point, &run).map(|()| run)) {
-            Ok(run) => self.append(Entry::Run(Box::new(run))),
+            Ok(run) => {
+                let inputs = point.inputs.clone();
+                self.append(Entry::Run(Box::new(Run { inputs, ..run })))
+            }
             Err(failure) if failure.is_interrupt() => Err(failure),
             Err(Failure { why, .. }) => {
                 (self.progress)(&format!("failed: {why}"));

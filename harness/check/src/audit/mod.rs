@@ -157,6 +157,7 @@ fn tree_file(dir: &Path, name: &str, manifest: &Manifest) -> CheckResult {
                     "the leaves of the tree have the digest {digest}, but those of the manifest {stated}"
                 ));
             }
+            result.needs_objects("the mesh has no leaf");
         }
     }
     result

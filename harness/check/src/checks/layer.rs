@@ -33,7 +33,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let tree = subject.tree_with_deleted();
     match Crossed::of(subject).filter(|_| !subject.promises.definition) {
         // Such a promise says nothing about the sides of leaves.
-        Some(crossed) => check_tree(&crossed.labelled(subject.tree()), terms, result),
+        Some(crossed) => check_tree(&crossed.labelled(tree), terms, result),
         None => check_tree(tree, terms, result),
     }
     let has_extra_layer =

@@ -68,7 +68,8 @@ impl<'a> Survey<'a> {
         };
         check(&survey, result);
         let band = survey.band_cells;
-        result.needs_objects(&format!("nothing lies beyond {band} cells from the geometry"));
+        let why = "nothing with a certain side lies beyond";
+        result.needs_objects(&format!("{why} {band} cells from the geometry"));
     }
 
     /// The position of an octant that no facet crosses.
@@ -112,11 +113,13 @@ impl<'a> Survey<'a> {
 
     /// Checks that the leaves fill the region to be kept, and nothing else.
     pub fn check_complete(&self, result: &mut CheckResult) {
+        let mut undecided = 0u64;
         self.visit(&mut |octant, kind, position| {
             let wanted = match position {
                 Position::On(_, kept) => kept,
                 Position::Near { crossed: true } if self.knows_crossing => self.terms.keep_crossing,
-                Position::Near { .. } | Position::Undecided => return,
+                Position::Near { .. } => return,
+                Position::Undecided => return undecided += 1,
             };
             result.examined += 1;
             if wanted != kind.is_some() {
@@ -124,6 +127,10 @@ impl<'a> Survey<'a> {
                 result.report(format_args!("{what}: {}", self.terms.root.place(octant)));
             }
         });
+        if undecided > 0 {
+            let why = "leaves and holes are not judged, because their rays disagree";
+            result.note = format!("{undecided} {why}");
+        }
     }
 
     /// Visits every leaf, and every hole in the largest octants that have one position. Holes near the geometry are

@@ -14,7 +14,7 @@ use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leave
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
-use contract::tree::{Builder, Kind, Tree};
+use contract::tree::{Builder, DELETED, Kind, Tree};
 use contract::word::{self, Side};
 
 pub(super) const CHECK: Check =
@@ -126,15 +126,16 @@ impl<'a> Crossed<'a> {
         result.needs_objects("the geometry crosses no leaf of the mesh");
     }
 
-    /// The tree with the sides of its leaves replaced: crossing if a facet crosses a leaf of the surface level, else
+    /// The tree with the sides of its leaves, but for deleted ones, replaced: crossing if a facet crosses a leaf of the surface level, else
     /// outside.
     pub fn labelled(&self, tree: &Tree) -> Tree {
         let mut builder = Builder::default();
-        self.facets.leaves(tree, &mut |octant, _, near| {
+        self.facets.leaves(tree, &mut |octant, kind, near| {
             let is_of_surface = octant.level == self.terms.level_surface;
             let crossing = is_of_surface && self.reaching(&octant, near).is_some();
             let side = if crossing { Side::Crossing } else { Side::Outside };
-            builder.push_leaf(word::key_of(octant.corner), octant.level, side as Kind);
+            let kind = if kind == DELETED { DELETED } else { side as Kind };
+            builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
         });
         builder.finish()
     }

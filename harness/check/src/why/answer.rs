@@ -197,7 +197,7 @@ impl Mesh<'_> {
         let root = self.inputs.root;
         let corner = root.quantise(point).and_then(cell_at).ok_or_else(|| {
             let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
-            format!("the point {point:?} lies outside the root, which is from {from:?} to {to:?}; give a point inside")
+            format!("the point {point:?} lies outside the root, which is from {from:?} up to, and without, {to:?}; give a point inside")
         })?;
         let leaf = self.tree.locate(corner);
         let leaf = leaf.map(|(octant, kind)| Leaf { octant, side: Side::ALL[usize::from(kind)] });

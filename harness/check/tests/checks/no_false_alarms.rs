@@ -1,10 +1,13 @@
-//! No false alarms: every check passes on the reference's meshes of random bodies, also in the audit.
+//! No false alarms: every check passes on the reference's meshes of random bodies, also in the audit. And a fault among deleted leaves, which no leaf shows.
 
 use crate::support;
 use check::audit;
 use check::checks::{self, Subject};
 use check::promises::{Promises, Sides, Surface, Touching};
+use contract::leafset::LeafSet;
 use contract::manifest::Tree;
+use contract::octant::Octant;
+use contract::word::{self, Leaf, Side};
 use geometries::Facet;
 use proptest::prelude::*;
 
@@ -122,4 +125,29 @@ proptest! {
             prop_assert!(result.holds(), "{text}{result}");
         }
     }
+}
+
+#[test]
+fn a_layer_that_is_too_thin_around_deleted_leaves_breaks_its_promise() {
+    let text = "spacing_min = 0.25\nlayer_cells_min = 4\nkeep_crossing = false\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
+    let correct = support::meshes_of_facets(text, &hull(([-1.0; 3], [2.0; 3]))).unwrap();
+    let promises = Promises { layers: true, ..Promises::default() };
+    let holds = |set: &LeafSet| {
+        let subject = Subject::new(&correct.case, Tree::Final, set).promising(&promises);
+        checks::all(&subject).iter().all(|result| result.holds())
+    };
+    assert!(holds(&correct.mesh));
+    // The leaves beside those that the facets at x = 1 cross, merged.
+    let near = word::octant(correct.mesh.words[0]).level;
+    let root = correct.mesh.manifest.root;
+    let is_near = |parent: &Octant| root.place(*parent).to_string().contains("[1.5, 0.0, 0.0] to");
+    let words = &correct.mesh.words;
+    let parents = words.iter().map(|w| word::octant(*w)).filter(|o| o.level > near);
+    let parent = parents.map(|o| o.parent()).find(is_near).expect("a leaf near the body");
+    let (inside, mut merged): (Vec<u64>, Vec<u64>) =
+        words.iter().partition(|w| parent.contains(&word::octant(**w)));
+    assert_eq!(inside.len(), 8);
+    merged.push(word::encode(&Leaf { octant: parent, side: Side::Outside }));
+    merged.sort_unstable();
+    assert!(!holds(&correct.mesh.with_parts(vec![merged])));
 }

@@ -6,7 +6,7 @@ use crate::options::Input;
 use crate::output::put;
 use bench::experiments::entry::{Line, Session};
 use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
-use bench::study::package::{self, copy, package};
+use bench::study::package::{self, copy, package, require_made};
 use bench::study::{SessionOptions, Study};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result};
@@ -50,12 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
     let of_study = Study::read(study)?;
-    if let Some(setup) = lines.iter().find_map(|line| of_study.unasked(line)) {
-        let why = format!(
-            "the record has a run that the study does not ask for, {setup}: give the study that made it"
-        );
-        return Err(Failure::input(why));
-    }
+    let paths = Paths::find();
+    require_made(&of_study, &lines, &paths)?;
     let names: Vec<String> = of_study.engines().iter().map(|name| label(name)).collect();
     let mut programs = lines.iter().filter_map(Line::run).map(|run| &run.setup.engine);
     if let Some(other) = programs.find(|name| !names.contains(name)) {
@@ -78,7 +74,6 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     put(EXPECTED, pretty(&expected))?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
-    let paths = Paths::find();
     package(study, &paths, &of_study)?;
     let sources = paths.catalogue.path.with_file_name("SOURCES.md");
     if sources.is_file() {
@@ -142,6 +137,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
         eprintln!("harness: {} {why}", path.display());
     }
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
+    require_made(&study, &lines, &Paths::find())?;
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
     // A network that was given is no property of a machine.
     let given = lines.iter().filter_map(Line::network).filter(|(_, network)| !network.measured);

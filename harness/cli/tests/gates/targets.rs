@@ -116,6 +116,13 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
+    // Another case than that of the runs.
+    let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
+    fixture.write("case.toml", &format!("enclosed = 'keep'\n{case}"));
+    let changed = fixture.harness(&archive.replace("-o a", "-o c"));
+    let why = "case.toml: rules or geometry are not those of the record's runs";
+    assert!(changed.code == 2 && changed.printed.contains(why), "{}", changed.printed);
+    fixture.write("case.toml", &case);
     let metadata = fs::read_to_string(fixture.path("a/ro-crate-metadata.json")).unwrap();
     for name in
         ["study/study.toml", "study/case.toml", "study/body.stl", "expected.json", "record.jsonl"]

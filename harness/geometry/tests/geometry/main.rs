@@ -89,6 +89,35 @@ fn a_removed_facet_leaves_one_opening_of_known_size() {
 }
 
 #[test]
+fn the_rim_of_a_half_model_in_a_face_of_the_root_is_no_opening() {
+    let mut facets = cube();
+    // The face x = 0.
+    facets.drain(8..10);
+    let openings = |x: f64| {
+        let root = Some(Root { origin: [x, -4.0, -4.0], edge: 16.0 });
+        let requested = Requested { spacing_min: Some(0.25), root, ..Requested::default() };
+        diagnose(&Input::new(facets.clone(), requested).unwrap(), 5)
+            .finding(Kind::Openings)
+            .unwrap()
+            .count
+    };
+    assert_eq!([0.0, 1.0, -1.0].map(openings), [0, 0, 1]);
+}
+
+#[test]
+fn vertices_that_f32_numbers_cannot_hold_are_found() {
+    let mut facets = cube();
+    facets.as_flattened_mut().iter_mut().for_each(|corner| corner[1] += 5e6);
+    let root = Some(Root { origin: [-16.0, 5e6 - 16.0, -16.0], edge: 32.0 });
+    // Such numbers are half a unit apart.
+    for (spacing, rounded) in [(0.5, 12), (2.0, 0)] {
+        let requested = Requested { spacing_min: Some(spacing), root, ..Requested::default() };
+        let found = diagnose(&Input::new(facets.clone(), requested).unwrap(), 5);
+        assert_eq!(count(&found, Kind::Rounded), rounded);
+    }
+}
+
+#[test]
 fn a_slit_is_judged_by_its_width_and_not_by_its_length() {
     let facets = cube_with_hole([1.0, 2.0], [3.0, 2.125]);
     for (spacing, changes) in [(0.125, true), (0.25, false)] {
@@ -333,7 +362,7 @@ fn facets_on_and_beyond_the_root_are_found() {
 fn json_has_the_schema_and_text_the_findings() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
-    assert_eq!(json["schema"], "octree-geometry/4");
+    assert_eq!(json["schema"], "octree-geometry/5");
     assert_eq!(json["findings"][0]["kind"], "openings");
     assert_eq!(json["findings"][0]["places"][0]["width"], 2.0);
     let text = found.to_string();

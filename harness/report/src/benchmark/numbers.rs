@@ -104,6 +104,9 @@ const NOT_READ: [&str; 4] = [
     r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
 
+/// Digits with points, thousands separators, and a power of ten.
+const LITERAL: &str = r"[0-9]{1,3}(?:,[0-9]{3})+(?:\.[0-9]+)?|[0-9.]*[0-9](?:[eE][-+]?[0-9]+|\s*\\(?:cdot|times)\s*10\^(?:\{\s*-?[0-9]+\s*\}|[0-9]))?";
+
 /// What a text has.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Checked {
@@ -130,8 +133,7 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
     }));
     let code = NOT_READ.iter().fold(code, |code, pattern| without(pattern, &code));
     let named = found.len();
-    for literal in all(r"[0-9.]*[0-9]", &code).into_iter().filter(|number| is_result(number, &code))
-    {
+    for literal in all(LITERAL, &code).into_iter().filter(|number| is_result(number, &code)) {
         let number = literal.as_str();
         let is_known = numbers.iter().any(|result| rounds_to(result, number));
         let why = || format!("{number} is written by hand, and no result rounds to it");
@@ -179,7 +181,7 @@ fn without(of: &str, text: &str) -> String {
 /// Whether digits are a number with a decimal point and three or more significant digits; one that begins with its point is not the end of
 /// a word.
 fn is_result(found: &Match, code: &str) -> bool {
-    let number = found.as_str();
+    let number = mantissa(found.as_str()).0;
     let digits = number.trim_start_matches(['0', '.']).replace('.', "").len();
     let is_end = number.starts_with('.') && code[..found.start()].ends_with(char::is_alphanumeric);
     number.matches('.').count() == 1 && digits >= 3 && !is_end
@@ -215,14 +217,23 @@ fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
 
 /// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
 fn rounds_to(number: &Number, literal: &str) -> bool {
+    let (literal, power) = mantissa(literal);
     let decimals = literal.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-    let literal =
-        &if literal.starts_with('.') { format!("0{literal}") } else { literal.to_owned() };
+    let literal = &if literal.starts_with('.') { format!("0{literal}") } else { literal };
     let ends = number.interval.split("--");
     ends.chain([number.value.as_str()]).any(|text| {
         let value: Result<f64, _> = text.replace(',', "").parse();
-        value.is_ok_and(|value| text == *literal || format!("{value:.decimals$}") == *literal)
+        let rounded = |value: f64| format!("{:.decimals$}", value / 10f64.powi(power));
+        value.is_ok_and(|value| rounded(value) == *literal)
     })
+}
+
+/// The digits before the power of ten of a number, without separators, and that power.
+fn mantissa(literal: &str) -> (String, i32) {
+    let end = literal.find(['e', 'E', '\\', ' ']).unwrap_or(literal.len());
+    let power = literal[end..].rsplit(['e', 'E', '^']).next().unwrap_or_default();
+    let power = power.trim_matches(|c: char| !c.is_ascii_digit() && c != '-');
+    (literal[..end].replace(',', ""), power.parse().unwrap_or(0))
 }
 
 #[cfg(test)]
@@ -276,10 +287,10 @@ mod tests {
     fn unknown_keys_old_copies_and_numbers_by_hand_are_found() {
         let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
         let findings = |text: &str| check(text, &record).findings;
-        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
+        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, $1.23\\times10^0$ or 0.123e1 s, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
-        assert_eq!(check(right, &record), Checked { compared: 7, by_hand: 4, findings: vec![] });
+        assert_eq!(check(right, &record), Checked { compared: 9, by_hand: 6, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
             ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),
@@ -294,6 +305,9 @@ mod tests {
             ("\\defresult{a/time}{1.234}{1.10--1.30}{75}{ms}", "1.10--1.30 75 ms here"),
             ("$x\\in[9.87, 1.23]$", "9.87 is written by hand"),
             ("$\\left[9.87, 1.23\\right]$", "9.87 is written by hand"),
+            ("1.23e5", "1.23e5 is written by hand"),
+            ("$1.23\\cdot 10^{-3}$", "is written by hand"),
+            ("1,001.23 s", "1,001.23 is written by hand"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),

@@ -70,11 +70,8 @@ pub type Broken = (usize, String);
 pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {
     let failures = failures(lines);
     let failed = || format!("{failures} runs failed and are missing in the figures");
-    // Efficiencies are of medians per rank, and counts repeat exactly.
-    let has_interval = |experiment: &str| ["strong", "spacing", "layers"].contains(&experiment);
-    let shown = groups.all.iter().filter(|g| has_interval(&g.setup.experiment));
-    let poor: Vec<usize> =
-        shown.filter(|g| g.time_s.coverage < 0.95).map(|g| g.runs.len()).collect();
+    let poor = groups.all.iter().filter(|g| g.time_s.coverage < 0.95);
+    let poor: Vec<usize> = poor.map(|g| g.runs.len()).collect();
     let count = poor.len();
     let vague = |least| {
         format!(
