@@ -68,10 +68,6 @@ struct BoxFile {
     spacing: f64,
 }
 
-const LAYER_CELLS_MIN_DEFAULT: u32 = 4;
-const KEEP_CROSSING_DEFAULT: bool = true;
-const ROOT_SCALE_DEFAULT: f64 = 10.0;
-
 impl Case {
     /// Reads a case file and the body that it names or generates.
     ///
@@ -82,9 +78,8 @@ impl Case {
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
-        let directory = path.parent().unwrap_or(Path::new(""));
         let Body { facets, solids } = match (&file.geometry, &file.generator) {
-            (Some(stl), None) => stl::read(&directory.join(stl))?,
+            (Some(stl), None) => stl::read(&path.with_file_name(stl))?,
             (None, Some(generator)) => {
                 let facets = generator.facets().map_err(|e| Failure::about(path, e))?;
                 Body { facets, solids: Vec::new() }
@@ -114,7 +109,7 @@ impl Case {
         }
         let root = root(file, &facets)?;
         positive("spacing_min", file.spacing_min)?;
-        let layer_cells_min = file.layer_cells_min.unwrap_or(LAYER_CELLS_MIN_DEFAULT);
+        let layer_cells_min = file.layer_cells_min.unwrap_or(4);
         if layer_cells_min == 0 {
             return Err("layer_cells_min is 0; a layer has at least one cell".to_owned());
         }
@@ -139,7 +134,7 @@ impl Case {
             level_surface,
             layer_cells_min,
             keep: file.keep,
-            keep_crossing: file.keep_crossing.unwrap_or(KEEP_CROSSING_DEFAULT),
+            keep_crossing: file.keep_crossing.unwrap_or(true),
             boxes,
             seeds: seeds_on_lattice(&root, &file.seeds)?,
             enclosed: file.enclosed,
@@ -177,7 +172,7 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
         let finite = root.origin.iter().all(|c| c.is_finite());
         return if finite { Ok(root) } else { Err("the root's origin is not finite".to_owned()) };
     }
-    let scale = file.root_scale.unwrap_or(ROOT_SCALE_DEFAULT);
+    let scale = file.root_scale.unwrap_or(10.0);
     positive("root_scale", scale)?;
     let along = |a: usize| facets.as_flattened().iter().map(move |vertex| f64::from(vertex[a]));
     let low = [0, 1, 2].map(|a| along(a).fold(f64::INFINITY, f64::min));
