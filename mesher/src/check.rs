@@ -182,8 +182,7 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     }
     for ([id, key], bits) in all {
         let l = (id & 31) as Level;
-        let is_everywhere = bits.len() == holders(l, key).1.len();
-        let equal = is_everywhere && bits.iter().all(|b| *b == bits[0]);
+        let equal = bits.len() == holders(l, key).1.len() && bits.iter().all(|b| *b == bits[0]);
         assert!(equal, "level {l}: replicas of a brick must be equal on all ranks that hold it");
     }
 }

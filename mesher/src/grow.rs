@@ -168,10 +168,9 @@ fn of_base_mesh(
     // A leaf of the base mesh with a seed may cross.
     let mut base = Rules { level_surface, seeds: Vec::new(), ..rules.clone() };
     base.boxes.iter_mut().for_each(|b| b.level = b.level.min(depth));
-    let facets = gather(comm, facets);
     let options = Options { ungraded: true, ..Options::default() };
     let mut record = Recorder::default();
-    let quantised = Quantised { rules: base, facets, counts };
+    let quantised = Quantised { rules: base, facets: gather(comm, facets), counts };
     // An error is the same on all ranks, as they grow the same mesh.
     let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record))?;
     let gone = match rules.keep {

@@ -59,8 +59,7 @@ pub fn mesh(
     job: &mut Job,
     may_run: impl FnOnce(&Quantised, &Job) -> Result<(), Error>,
 ) -> Result<Report, Error> {
-    let claim = |output| OutDir::claim(output, job.comm);
-    let out = job.options.out.as_ref().map(claim).transpose()?;
+    let out = job.options.out.as_ref().map(|output| OutDir::claim(output, job.comm)).transpose()?;
     let quantised = quantised(case, job)?;
     may_run(&quantised, job)?;
     let mesh = grow(quantised, job)?;

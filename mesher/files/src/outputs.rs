@@ -223,8 +223,7 @@ impl Claim {
         let others: Vec<CString> = others.iter().flat_map(|name| names_of(name)).collect();
         let (unfinished, (last, is_new)) = Unfinished::begin(|| {
             let ((dir, last, id), is_new) = open(&path, &names[0])?;
-            let created = is_new.then_some(path);
-            Ok((Output { dir, names, id, others, created }, (last, is_new)))
+            Ok((Output { dir, names, id, others, created: is_new.then_some(path) }, (last, is_new)))
         })?;
         Ok(Self { unfinished, last, is_new })
     }

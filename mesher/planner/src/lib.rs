@@ -189,8 +189,7 @@ impl<'a> Problem<'a> {
             |shift: Level| rough / 4f64.powi(shift as i32) + rough_boxed / 8f64.powi(shift as i32);
         // Without doubt that the run does not fit, its pilots are short.
         let thick = (f64::from(self.rules.layer_cells_min) / 4.0).clamp(1.0, 16.0);
-        let is_undoubted = self.used_rough() > USED_UNDOUBTED * thick;
-        let doubted = if is_undoubted { 0.0 } else { rough_at(0) };
+        let doubted = if self.used_rough() > USED_UNDOUBTED * thick { 0.0 } else { rough_at(0) };
         let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT);
         let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
         let mut pilots = Vec::new();
@@ -204,8 +203,7 @@ impl<'a> Problem<'a> {
                 time_cpu_s: amounts.time_cpu_s(),
             });
             let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed };
-            let is_last = coarser.is_some() && pilot.at(shift - shift.min(1)).cells > cells_max;
-            if shift == 0 || is_last {
+            if shift == 0 || coarser.is_some() && pilot.at(shift - shift.min(1)).cells > cells_max {
                 return Ok(self.plan_of(pilots, &pilot, &ranks));
             }
             coarser = Some(amounts);

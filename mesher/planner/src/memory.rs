@@ -55,8 +55,7 @@ pub struct Tightest {
 /// What the limit on its address space leaves this process, in bytes; infinity without a limit.
 pub fn address_space_left() -> f64 {
     let used = stated_bytes("/proc/self/status", "VmSize:").unwrap_or(0) as f64;
-    let limit = getrlimit(Resource::As).current;
-    limit.map_or(f64::INFINITY, |bytes| (bytes as f64 - used).max(0.0))
+    getrlimit(Resource::As).current.map_or(f64::INFINITY, |bytes| (bytes as f64 - used).max(0.0))
 }
 
 /// The least that the groups of this process leave, from its own group to the root of the hierarchy below `mount`. Inside a container

@@ -79,8 +79,7 @@ pub fn coarser(rules: &Rules, shift: Level) -> Rules {
 pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amounts {
     let stored: usize = mesh.crossing.iter().chain(&mesh.sides.stored).map(BrickSet::bytes).sum();
     let time = |of: &[&str]| -> f64 {
-        let phases = job.record.phases.iter();
-        phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
+        job.record.phases.iter().filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
     };
     let all: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
     let time_refine_s = time(&["refine"]);

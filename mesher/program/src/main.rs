@@ -286,9 +286,8 @@ fn registered(source: &Source) -> Result<(), Error> {
 
 /// Finds out that two options name one output, or one in the directory of another.
 fn named_apart(args: &Args) -> Result<(), Error> {
-    let outputs = [&args.out, &args.json, &args.status];
     let name = |path: &PathBuf| files::name_output(path).map_err(|e| Error::input(e).at(path));
-    outputs.into_iter().flatten().try_for_each(name)
+    [&args.out, &args.json, &args.status].into_iter().flatten().try_for_each(name)
 }
 
 const WRITABLE: &str = "a report is JSON";

@@ -79,7 +79,6 @@ impl Case {
             finite(&format!("seed {number}"), given)?;
             Ok(Seed { given, lattice: root.nearest(given) })
         };
-        let seeds = self.seeds.iter().enumerate().map(seed).collect::<Result<_, Error>>()?;
         Ok(Rules {
             root,
             level_surface,
@@ -87,7 +86,7 @@ impl Case {
             keep: self.keep,
             keep_crossing: self.keep_crossing,
             boxes,
-            seeds,
+            seeds: self.seeds.iter().enumerate().map(seed).collect::<Result<_, Error>>()?,
             enclosed: self.enclosed,
         })
     }

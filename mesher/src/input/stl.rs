@@ -34,10 +34,9 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     let count = head.get(80..).and_then(|after| after.first_chunk());
     let count = count.map(|&bytes| u64::from(u32::from_le_bytes(bytes)));
     let binary = count.filter(|count| length == HEADER + RECORD * count);
-    let stl = Stl { path: path.to_owned(), file, binary };
     // The first word of a text, if it has one, is `solid`, and no byte is zero.
     if binary.is_some() || may_begin_with_solid(&head) && !head.contains(&0) {
-        return Ok(stl);
+        return Ok(Stl { path: path.to_owned(), file, binary });
     }
     let neither =
         "is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file";
@@ -59,8 +58,7 @@ impl Stl {
         let mut out = Vec::with_capacity((end - first) as usize);
         let mut buffer = vec![0; (CHUNK.min(end - first) * RECORD) as usize];
         for at in (first..end).step_by(CHUNK as usize) {
-            let count = CHUNK.min(end - at);
-            let bytes = &mut buffer[..(count * RECORD) as usize];
+            let bytes = &mut buffer[..(CHUNK.min(end - at) * RECORD) as usize];
             self.file.read_exact_at(bytes, HEADER + RECORD * at).map_err(|e| {
                 Error::input(format!("{e} at facet {at}: export it again")).at(&self.path)
             })?;

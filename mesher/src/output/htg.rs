@@ -55,8 +55,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
             });
         }
         let compressed = comm.sparse_all_to_all(chunks);
-        let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
-        agree(comm, written.map_err(&failed))?;
+        agree(comm, file.as_mut().map_or(Ok(()), |file| add(&compressed, file)).map_err(&failed))?;
     }
     let publish = |file: TreeFile| file.finish()?.into_inner()?.publish();
     agree(comm, file.map_or(Ok(()), publish).map_err(&failed))

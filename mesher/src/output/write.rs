@@ -82,8 +82,7 @@ impl OutDir {
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, rank].into_iter().flat_map(names).collect();
         let join = || Claim::join(path, MANIFEST, mine, is_new == 1).map_err(failed);
-        let claim = agree(comm, created.map_or_else(join, Ok))?;
-        Ok(Self { output: files.clone(), claim })
+        Ok(Self { output: files.clone(), claim: agree(comm, created.map_or_else(join, Ok))? })
     }
 
     /// Begins a file of the mesh.

@@ -44,8 +44,7 @@ fn cut_at(bins: &[Bin], comm: &dyn Comm, begins: impl Fn(&[u128]) -> Vec<u128>) 
     if loads.iter().all(|&load| load == 0) {
         return vec![(0, 0)];
     }
-    let before = loads[..comm.rank()].iter().sum();
-    let all = gather(comm, &boundaries(bins, before, &begins(&loads)));
+    let all = gather(comm, &boundaries(bins, loads[..comm.rank()].iter().sum(), &begins(&loads)));
     all.into_iter().map(|[start, owner]| (start, owner as usize)).collect()
 }
 

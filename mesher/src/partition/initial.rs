@@ -69,8 +69,7 @@ impl Estimate<'_> {
                     let side = |a: usize| (b.max[a] - b.min[a]).min(h) as f64;
                     (0..3).map(side).product::<f64>() / (edge(b.level) as f64).powi(3)
                 };
-                let at_surface = each * (h as f64).powi(2) / face;
-                at_surface <= most && boxes.iter().all(|b| in_box(b) <= most)
+                each * (h as f64).powi(2) / face <= most && boxes.iter().all(|b| in_box(b) <= most)
             };
             (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
         };

@@ -39,9 +39,8 @@ pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u3
 /// forest is much smaller than all its pairs. Collective.
 fn group_forest(pairs: Pairs, comm: &dyn Comm) -> Pairs {
     let group = comm.size().isqrt();
-    let first = comm.rank() / group * group;
     let mut messages = MessageBuffer::default();
-    messages.write_values(first, &forest(&pairs));
+    messages.write_values(comm.rank() / group * group, &forest(&pairs));
     let received: Vec<_> = comm.sparse_all_to_all(messages).values();
     forest(&received)
 }
@@ -92,9 +91,8 @@ fn across_ranks(
     faces.sort_unstable();
     let mut out = MessageBuffer::default();
     for run in faces.chunk_by(|a, b| a.0 == b.0) {
-        let bits = run.iter().fold(0, |all, f| all | f.1);
         let (rank, level, key, label) = run[0].0;
-        out.write(rank, [u64::from(level), key, label, bits]);
+        out.write(rank, [u64::from(level), key, label, run.iter().fold(0, |all, f| all | f.1)]);
     }
     drop(faces);
     let (mut pairs, mut path) = (Vec::new(), Vec::new());
