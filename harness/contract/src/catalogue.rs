@@ -146,8 +146,7 @@ fn is_path(argument: &str) -> bool {
 /// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported
 /// when the case is used.
 fn missing_geometry(case: &Path) -> Option<String> {
-    let text = files::read_text(case).ok()?;
-    let table = text.parse::<toml::Table>().ok()?;
+    let table = files::read_text(case).ok()?.parse::<toml::Table>().ok()?;
     let geometry = table.get("geometry")?.as_str()?;
     let exists = case.parent()?.join(geometry).exists();
     (!exists).then(|| {

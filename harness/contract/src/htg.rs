@@ -262,8 +262,7 @@ impl Walk<'_> {
                 } else if masked & bit == 0 {
                     if usize::from(side) >= Side::ALL.len() {
                         let node = first + u64::from(i);
-                        let why = format!("node {node} has the side {side}");
-                        return Err(TreeError::Damaged(why));
+                        return Err(TreeError::Damaged(format!("node {node} has the side {side}")));
                     }
                     self.blocks.push(Block { first: word(key, level, side), depth: 0 });
                 }
@@ -286,8 +285,7 @@ impl Walk<'_> {
         let Block { first, depth } = last[0];
         let is_like = |block: &Block| block.depth == depth && (block.first ^ first) & 127 == 0;
         if word::key(first) == key && last[0].level() == level && last.iter().all(is_like) {
-            let begin = others.len();
-            self.blocks.truncate(begin);
+            self.blocks.truncate(others.len());
             self.blocks.push(Block { first, depth: depth + 1 });
         }
     }

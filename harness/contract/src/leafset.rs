@@ -56,8 +56,7 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>> {
     Failure::unless(!names.iter().any(is_beyond), why)?;
     let read = |name: String| {
         let path = dir.join(&name);
-        let part = PartFile::open(&path).map_err(|why| why.of_file(&path))?;
-        Ok((name, part.read_all()?))
+        Ok((name, PartFile::open(&path).map_err(|why| why.of_file(&path))?.read_all()?))
     };
     names.into_iter().map(read).collect()
 }

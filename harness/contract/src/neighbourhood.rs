@@ -54,9 +54,8 @@ impl Neighbourhood {
 
     /// The neighbourhood of a child.
     pub fn child(&self, tree: &Tree, digit: u8) -> Self {
-        let level = self.octant.level;
         let handles = DESCENT[usize::from(digit)]
-            .map(|(index, digit)| tree.child(self.handles[index], digit, level));
+            .map(|(index, digit)| tree.child(self.handles[index], digit, self.octant.level));
         Self { octant: self.octant.child(digit), handles }
     }
 

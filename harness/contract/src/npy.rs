@@ -86,8 +86,7 @@ fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), &'static str> {
     let (descr, shape) = descr.ok_or("it has no type or shape")?;
     let dimensions = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
     let shape = dimensions.map(|n| n.parse().map_err(|_| "its shape is not of numbers"));
-    let descr = descr.trim_matches('\'').to_owned();
-    Ok((descr, shape.collect::<Result<_, _>>()?, end as u64))
+    Ok((descr.trim_matches('\'').to_owned(), shape.collect::<Result<_, _>>()?, end as u64))
 }
 
 /// Writes words as a part file.
@@ -106,8 +105,7 @@ pub fn bytes(words: &[u64]) -> Vec<u8> {
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does.
 pub fn header(descr: &str, shape: &str) -> Vec<u8> {
     let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
-    let padding = (64 - (10 + text.len() + 1) % 64) % 64;
-    text.push_str(&" ".repeat(padding));
+    text.push_str(&" ".repeat((64 - (10 + text.len() + 1) % 64) % 64));
     text.push('\n');
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((text.len() as u16).to_le_bytes());

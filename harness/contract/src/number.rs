@@ -4,8 +4,7 @@ use std::iter;
 
 /// A length with three significant digits.
 pub fn number(x: f64) -> String {
-    let is_short = x == 0.0 || (1e-4..1e6).contains(&x.abs());
-    if is_short { digits(x) } else { format!("{x:.2e}") }
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { digits(x) } else { format!("{x:.2e}") }
 }
 
 /// Three significant digits, and all before the decimal point.

@@ -104,8 +104,7 @@ impl Octant {
         if self.level == 0 {
             return "root".to_owned();
         }
-        let digits = (1..=self.level).map(|l| self.ancestor(l).digit().to_string());
-        digits.collect::<Vec<_>>().join(".")
+        (1..=self.level).map(|l| self.ancestor(l).digit().to_string()).collect::<Vec<_>>().join(".")
     }
 }
 

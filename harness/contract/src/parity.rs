@@ -24,8 +24,7 @@ struct Grid {
 impl Parity {
     /// Bins facets.
     pub fn new(facets: &[FacetLattice]) -> Self {
-        let grids = std::array::from_fn(|axis| Grid::new(facets, axis));
-        Self { facets: facets.to_vec(), grids }
+        Self { facets: facets.to_vec(), grids: std::array::from_fn(|axis| Grid::new(facets, axis)) }
     }
 
     /// Whether each ray from this point, which is on no facet, crosses an odd number of facets: +x, -x, +y, -y, +z, -z.

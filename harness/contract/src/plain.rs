@@ -54,8 +54,7 @@ impl PlainCase {
             )?,
         }
         let path = directory.join("case.toml");
-        let text = toml::to_string(&table).expect("a case is representable in TOML");
-        fs::write(&path, text)?;
+        fs::write(&path, toml::to_string(&table).expect("a case is representable in TOML"))?;
         Ok(path)
     }
 }

@@ -45,8 +45,7 @@ pub fn read(path: &Path) -> Result<Body> {
 pub fn parse(bytes: &[u8]) -> Result<Body> {
     Failure::unless(!bytes.is_empty(), wrong("it is empty"))?;
     let Some(facets) = binary(bytes) else { return ascii(bytes) };
-    let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
-    Ok(Body { facets, solids })
+    Ok(Body { solids: vec![Solid { name: None, facet_first: 0, facets: facets.len() }], facets })
 }
 
 /// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot

@@ -158,8 +158,7 @@ impl Tree {
         if of.is_node() {
             return level + self.summaries[of.index()].coarsest;
         }
-        let leaf = of.leaf_of(level).filter(|(kind, _)| *kind != DELETED);
-        leaf.map_or(NO_LEAF, |(_, level)| level)
+        of.leaf_of(level).filter(|(kind, _)| *kind != DELETED).map_or(NO_LEAF, |(_, level)| level)
     }
 
     /// The kinds of leaves in `of`, and [`HOLES`] if it has holes; the empty set outside the root.
@@ -181,8 +180,7 @@ impl Tree {
     pub fn walk_below(&self, octant: Octant, of: Handle, enter: Enter) {
         if enter(octant, of) && of.is_node() {
             for digit in 0..8 {
-                let child = self.child(of, digit, octant.level);
-                self.walk_below(octant.child(digit), child, enter);
+                self.walk_below(octant.child(digit), self.child(of, digit, octant.level), enter);
             }
         }
     }
@@ -287,8 +285,7 @@ impl Builder {
         let kind = (block.first & 3) as Kind;
         if self.block.0 != kind || self.block.1 != block.depth || block.depth == 0 {
             let of_depth = |content, _| self.tree.intern([content; 8]);
-            let content = (0..block.depth).fold(Handle::leaf(kind), of_depth);
-            self.block = (kind, block.depth, content);
+            self.block = (kind, block.depth, (0..block.depth).fold(Handle::leaf(kind), of_depth));
         }
         self.push_content(word::key(block.first), block.level(), self.block.2)
     }

@@ -24,8 +24,7 @@ impl Triangle {
     pub fn new(corners: &FacetLattice) -> Self {
         let [low, high] = bounds(corners);
         let normal = normal(corners);
-        let height = dot(normal, corners[0]);
-        Self { corners: *corners, low, high, normal, height }
+        Self { corners: *corners, low, high, normal, height: dot(normal, corners[0]) }
     }
 
     /// Whether the triangle shares a point with the closed box.

@@ -75,8 +75,7 @@ impl Cells {
     fn agree_with_levels(&self, words: &[u64]) -> Result<()> {
         let Some(levels) = &self.levels else { return Ok(()) };
         let offset = |i: usize| i64::from(word::level(words[i])).wrapping_sub(levels[i]);
-        let differs = (1..words.len()).find(|&i| offset(i) != offset(0));
-        let Some(i) = differs else { return Ok(()) };
+        let Some(i) = (1..words.len()).find(|&i| offset(i) != offset(0)) else { return Ok(()) };
         Err(Failure::input(format!(
             "cell {i} has level {} and edge {}, but cell 0 has level {} and edge {}: levels and edges contradict each other",
             levels[i], self.edges[i], levels[0], self.edges[0]
@@ -152,8 +151,7 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant> {
                 "is not aligned: it is {position} of its edges from the root along axis {axis}"
             )));
         }
-        let is_inside = (0.0..f64::from(1u32 << level)).contains(&index);
-        Failure::unless(is_inside, "lies outside the root")?;
+        Failure::unless((0.0..f64::from(1u32 << level)).contains(&index), "lies outside the root")?;
         cell[axis] = index as u32 * (CELLS_PER_EDGE >> level);
     }
     Ok(Octant { corner: cell, level })

@@ -60,8 +60,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
         let corner = [0, 1, 2]
             .map(|a| placed.origin[a] + (trees.corners[tree][a] - stated.origin[a]) * scale);
-        let tree = Root { origin: corner, edge: trees.edges[tree] * scale };
-        add_tree(quadrants, &tree, &mut cells)?;
+        add_tree(quadrants, &Root { origin: corner, edge: trees.edges[tree] * scale }, &mut cells)?;
     }
     Ok(cells)
 }
@@ -97,8 +96,7 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells> {
     if let (Ok(bytes), [edge]) = (attributes.as_slice().try_into(), &mut trees.edges[..]) {
         // Any program may have attributes of eight bytes.
         let exact = f64::from_le_bytes(bytes);
-        let is_edge = (exact - *edge).abs() <= 1e-9 * *edge;
-        *edge = if is_edge { exact } else { *edge };
+        *edge = if (exact - *edge).abs() <= 1e-9 * *edge { exact } else { *edge };
     }
     Ok(trees)
 }
