@@ -97,8 +97,7 @@ pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
     let free = || (0..).zip(words).filter(|(_, w)| !word::is_crossing(**w));
     for (i, &w) in free() {
         let octant = word::octant(w);
-        let neighbours = coarse_neighbours(words, &octant);
-        let free = neighbours.filter(|&j| !word::is_crossing(words[j]));
+        let free = coarse_neighbours(words, &octant).filter(|&j| !word::is_crossing(words[j]));
         free.for_each(|j| sets.union(i, j as u32));
     }
     let mut members: Vec<(u32, u8, u32)> =
@@ -141,8 +140,7 @@ fn by_rays(leaves: &[u32], words: &[u64], parity: &Parity) -> (Side, Decision) {
     let (mut candidates, mut inside) = (0, 0);
     for &i in leaves.iter().take(CANDIDATES_MAX) {
         let candidate = word::octant(words[i as usize]);
-        let votes = parity.inside(candidate.centre());
-        let odd = votes.iter().filter(|&&v| v).count();
+        let odd = parity.inside(candidate.centre()).iter().filter(|&&v| v).count();
         if odd == 0 || odd == 6 {
             let side = if odd == 6 { Side::Inside } else { Side::Outside };
             return (side, Decision::Rays(candidate));

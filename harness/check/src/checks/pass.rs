@@ -90,8 +90,7 @@ impl State {
             self.by_code[(word & 127) as usize] += block.leaves();
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
                 let [before, word] = [before, word].map(|word| Named(Some(word), *root));
-                let finding = format_args!("{file} is not sorted: {word} follows {before}");
-                self.linear.report(finding);
+                self.linear.report(format_args!("{file} is not sorted: {word} follows {before}"));
             }
         }
     }
@@ -119,8 +118,7 @@ impl State {
         (0..).zip(self.by_code).for_each(|(code, leaves)| self.tally.count(code, leaves));
         self.tally.finish();
         self.linear.examined = self.tally.leaves;
-        let fits = self.builder.nodes() <= self.nodes_max;
-        let tree = fits.then(|| self.builder.finish());
+        let tree = (self.builder.nodes() <= self.nodes_max).then(|| self.builder.finish());
         Pass { tally: self.tally, linear: self.linear, tree }
     }
 }

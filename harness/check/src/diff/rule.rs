@@ -35,8 +35,7 @@ fn of_centre(mesh: &Mesh, octant: &Octant) -> Answer {
 
 /// The rule for an octant that has different sides.
 fn side(x: &Leaf, y: &Leaf, mesh: &Mesh) -> String {
-    let answer = of_centre(mesh, &x.octant);
-    let Some((side, decision)) = answer.side_decided_by else {
+    let Some((side, decision)) = of_centre(mesh, &x.octant).side_decided_by else {
         return "section 4 (side): give the case file (--case) to decide it".to_owned();
     };
     let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == side);

@@ -50,8 +50,7 @@ fn band(case: &Case) -> f64 {
     let coordinates = case.facets.iter().flatten().flatten();
     let largest = coordinates.fold(0.0, |most: f64, &c| most.max(f64::from(c).abs()));
     let single = 16.0 * f64::from(f32::EPSILON) * largest;
-    let lattice = 4.0 * case.root.edge / UNITS_PER_EDGE as f64;
-    single.max(lattice)
+    single.max(4.0 * case.root.edge / UNITS_PER_EDGE as f64)
 }
 
 /// Whether every edge belongs to an even number of facets on the lattice, regardless of their winding.

@@ -57,8 +57,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         m.geometry.iter_mut().for_each(|of| of.digest.0 ^= 1);
     }),
     manifest("manifest: wrong treatment of enclosed components", INFORMED, |m| {
-        let is_deleted = m.enclosed == Enclosed::Delete;
-        m.enclosed = if is_deleted { Enclosed::Keep } else { Enclosed::Delete };
+        m.enclosed = if m.enclosed == Enclosed::Delete { Enclosed::Keep } else { Enclosed::Delete };
     }),
     manifest("manifest: final mesh labelled T0", INFORMED, |m| m.tree = Tree::Base),
     sets("manifest: T0 labelled final mesh", "manifest", INFORMED, |s, mutation| {
@@ -67,8 +66,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Some(())
     }),
     sets("leaf's side flipped, manifest unchanged", "manifest", AUDITED, |_, mutation| {
-        let part = mutation.mesh.parts.iter_mut().find(|p| !p.is_empty())?;
-        let last = part.last_mut()?;
+        let last = mutation.mesh.parts.iter_mut().find(|p| !p.is_empty())?.last_mut()?;
         *last = other_side(*last);
         Some(())
     }),
@@ -125,8 +123,7 @@ const OTHER: &str = "leaves-00002.npy";
 
 fn keep_bytes(dir: &Path, of: impl Fn(u64) -> u64) -> Result<()> {
     let file = fs::OpenOptions::new().write(true).open(dir.join(PART))?;
-    let len = file.metadata()?.len();
-    file.set_len(of(len))
+    file.set_len(of(file.metadata()?.len()))
 }
 
 /// The same data with another header.

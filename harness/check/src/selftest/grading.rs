@@ -108,8 +108,7 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
         if distance < n * cell {
             found.within_layer = found.within_layer.max(leaf.level);
         }
-        let at_surface = word::is_crossing(w) && leaf.level == surface;
-        let too_coarse = at_surface && merged.level < surface;
+        let too_coarse = word::is_crossing(w) && leaf.level == surface && merged.level < surface;
         found.in_surface_layer |= too_coarse && distance < (n - 1) * cell_surface;
     }
     let touches = |&w: &u64| word::is_crossing(w) && merged.distance(&word::octant(w)) == 0;

@@ -131,8 +131,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("crossing leaves of the mesh merged", "spacing", AUDITED, |s| {
         let words = &s.mesh.words;
-        let crossing = |&i: &usize| word::is_crossing(words[i]);
-        let i = sibling_groups(words).into_iter().find(crossing)?;
+        let i = sibling_groups(words).into_iter().find(|&i: &usize| word::is_crossing(words[i]))?;
         (word::level(words[i]) == s.case.level_surface).then(|| merge(words, &[i]))
     }),
     words("leaves of the mesh merged in a box", "spacing", AUDITED, |s| {

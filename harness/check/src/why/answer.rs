@@ -264,8 +264,7 @@ impl Mesh<'_> {
                 let deletes =
                     "keep_crossing is false, so crossing leaves are deleted after gradation";
                 let rule = if self.inputs.keep_crossing { LOST } else { deletes };
-                let facets = that_cross(&self.facets_of(base));
-                (Side::Crossing, facets, format!("section 7: {rule}"))
+                (Side::Crossing, that_cross(&self.facets_of(base)), format!("section 7: {rule}"))
             }
         };
         Some(((side, decision), rule))
