@@ -86,8 +86,7 @@ fn made(kind: &str, (name, write): (&str, Write), export: &Export, path: &Path) 
     (export.options.script)(kind, &source, &file)?;
     let mut made = File::open(&file).map_err(failed)?;
     let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
-    let bytes = fill_atomically(path, copy)?;
-    Ok(Summary { bytes, ..written })
+    Ok(Summary { bytes: fill_atomically(path, copy)?, ..written })
 }
 
 /// The format of a file with this name.

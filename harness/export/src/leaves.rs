@@ -159,8 +159,7 @@ impl Leaves {
         let beyond = around.across.map(|ends| ends.map(|end| self.children(end, level)));
         for digit in 0..8 {
             let across = |axis: usize, side: usize| {
-                let is_sibling = (digit >> axis & 1) != side;
-                let of = if is_sibling { &own } else { &beyond[axis][side] };
+                let of = if (digit >> axis & 1) != side { &own } else { &beyond[axis][side] };
                 of[digit ^ 1 << axis]
             };
             let child = Around {

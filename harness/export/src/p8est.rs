@@ -56,8 +56,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
             count += 1;
             written.add(&octant, data != FILLER);
             let Octant { corner: [x, y, z], level } = octant;
-            let numbers = [x, y, z, level.into()];
-            out.write_all(bytemuck::bytes_of(&numbers)).map_err(named)?;
+            out.write_all(bytemuck::bytes_of(&[x, y, z, level.into()])).map_err(named)?;
             out.write_all(&[data]).map_err(named)
         })?;
         written.check_invariants(leaves);
@@ -105,8 +104,7 @@ fn connectivity(root: &Root) -> Vec<u8> {
     bytes.resize(ALIGNMENT, 0);
     // Format, bytes of an index, and numbers of vertices, trees, edges, trees at edges, corners, trees at corners, bytes of
     // attributes; the last number is reserved.
-    let opposite = root.to_user([UNITS_PER_EDGE; 3]);
-    let is_lost = opposite[0] - root.origin[0] != root.edge;
+    let is_lost = root.to_user([UNITS_PER_EDGE; 3])[0] - root.origin[0] != root.edge;
     let attribute = if is_lost { &root.edge.to_le_bytes()[..] } else { &[] };
     let numbers = [FORMAT, 4, 8, 1, 0, 0, 0, 0, attribute.len() as u64, 0];
     bytes.extend_from_slice(bytemuck::bytes_of(&numbers));

@@ -118,7 +118,6 @@ impl<'a> ListFile<'a> {
 
     /// Waits until the file is on disk.
     fn finish(self) -> Result<()> {
-        let file = self.out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
-        Ok(file.sync_all()?)
+        Ok(self.out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?)
     }
 }

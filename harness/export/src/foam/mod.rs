@@ -92,8 +92,7 @@ fn read(export: &Export<'_>) -> Result<Mesh> {
         true
     })?;
     export.require_some(leaves.count().into())?;
-    let patches = Patches::new(options.case, !export.is_of_all());
-    Mesh::new(leaves, ranks, patches, options)
+    Mesh::new(leaves, ranks, Patches::new(options.case, !export.is_of_all()), options)
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then the first.
@@ -202,8 +201,7 @@ impl Patches {
     pub fn new(case: Option<&Case>, has_cut: bool) -> Self {
         let mut names = SIDES.map(str::to_owned).to_vec();
         let (mut of_facet, mut patch_of) = (Vec::new(), HashMap::new());
-        let solids = case.iter().flat_map(|case| &case.solids);
-        for solid in solids.filter(|solid| solid.facets > 0) {
+        for solid in case.iter().flat_map(|case| &case.solids).filter(|solid| solid.facets > 0) {
             let patch = *patch_of.entry(&solid.name).or_insert_with(|| {
                 let name = patch_name(solid.name.as_deref().unwrap_or_default());
                 names.push(numbered(&name, '_', |name| !names.contains(name)));
