@@ -80,10 +80,9 @@ impl Shells {
             all[of[facet] as usize].add(&lattice[facet]);
         }
         for uses in edges.iter() {
-            let down = uses.iter().filter(|one| one.is_down).count();
             let shell = &mut all[of[uses[0].facet as usize] as usize];
             shell.is_closed &= uses.len() % 2 == 0;
-            shell.is_oriented &= 2 * down == uses.len();
+            shell.is_oriented &= 2 * uses.iter().filter(|one| one.is_down).count() == uses.len();
         }
         let mut own = vec![Vec::new(); all.len()];
         for (facet, shell) in lattice.iter().zip(&of).filter(|(_, shell)| **shell != u32::MAX) {

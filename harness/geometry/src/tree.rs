@@ -111,8 +111,7 @@ impl FacetTree {
 
 /// The bounding box of facets, in the user's units.
 pub fn bounds(facets: &[Facet]) -> Aabb {
-    let vertices = facets.as_flattened().iter();
-    Aabb::from_points(vertices.map(|v| Point::from(v.map(f64::from))))
+    Aabb::from_points(facets.as_flattened().iter().map(|v| Point::from(v.map(f64::from))))
 }
 
 /// A facet in f64. It begins with its least vertex, so that rounding does not depend on where a file begins it.

@@ -92,11 +92,10 @@ impl Passage {
         let is_between = 0.0 < min && min <= width && width <= max + ROUNDING;
         assert!(is_between, "width {width} is not between {min} and {max} units");
         let counted = self.points[first..=last].iter().map(|p| p.width * scale);
-        let least = counted.fold(f64::INFINITY, f64::min);
         let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
         let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
         let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
-        let widths = [Some(least), Some(nearest), rim];
+        let widths = [Some(counted.fold(f64::INFINITY, f64::min)), Some(nearest), rim];
         let are_near = widths.iter().all(|w| w.is_some_and(|w| is_near(w, width)));
         assert!(are_near, "width {width}; of all points, to all facets, at the rim {widths:?}");
     }

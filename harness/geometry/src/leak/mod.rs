@@ -89,8 +89,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         let spacing = Spacing::of(level, root);
         let is_joined = self.search(level, ends, None)?;
         let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
-        let by_rays = self.case.seeds.is_empty();
-        let is_enclosed = !is_joined && end.is_none() && is_outside && by_rays;
+        let is_enclosed = !is_joined && end.is_none() && is_outside && self.case.seeds.is_empty();
         let outside = if is_joined && end.is_none() { self.closed(start)? } else { None };
         let is_leak = is_joined && (outside.is_none() || self.search(level, ends, outside)?);
         let (closes, passage) = (None, None);
@@ -116,17 +115,15 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
             self.watch.step(&format!("meshing the base tree of level {level}"));
-            let words = (self.make)(level)?;
-            self.trees.insert(level, words);
+            self.trees.insert(level, (self.make)(level)?);
         }
         Ok(())
     }
 
     /// An end of which facets cross the leaf in a base tree.
     fn crossed(&self, level: u8, (from, to): Ends) -> Option<(&'static str, Point)> {
-        let ends = [Some(("--from", from)), to.map(|to| ("--to", to))];
         let is_crossed = |end: &(_, Point)| word::is_crossing(leaf_at(&self.trees[&level], end.1));
-        ends.into_iter().flatten().find(is_crossed)
+        [Some(("--from", from)), to.map(|to| ("--to", to))].into_iter().flatten().find(is_crossed)
     }
 
     /// The finest coarser level at which the start is inside, if part of the root's boundary is outside there. The root may cut the body, so

@@ -62,8 +62,7 @@ impl Way {
 
     /// The radius of a ball that passes along all legs.
     fn passing(&self) -> f64 {
-        let legs = self.points.windows(2).map(|leg| passing(&leg[0], &leg[1]));
-        legs.fold(self.clearance(), f64::min)
+        self.points.windows(2).map(|leg| passing(&leg[0], &leg[1])).fold(self.clearance(), f64::min)
     }
 }
 

@@ -98,8 +98,7 @@ impl<'a> Space<'a> {
     }
 
     fn at(&self, at: [u32; 3]) -> u32 {
-        let before = self.order.range(..=key(at)).next_back();
-        *before.expect("the cells tile the root").1
+        *self.order.range(..=key(at)).next_back().expect("the cells tile the root").1
     }
 
     /// Appends every cell that shares part of a face with this one.
@@ -219,8 +218,7 @@ impl<'a> Space<'a> {
                 let [here, there] = [cell, next].map(|cell| self.cells[cell as usize]);
                 let step = here.centre().distance(there.centre()) as f32;
                 // Up to twice its length or more where the step is as narrow as possible.
-                let clearance = there.clearance;
-                let detour = if cap.is_finite() { (cap / clearance).min(8.0) } else { 0.0 };
+                let detour = if cap.is_finite() { (cap / there.clearance).min(8.0) } else { 0.0 };
                 let reached = (label.0.min(wide), label.1 + step * (1.0 + detour));
                 let best = labels[next as usize];
                 if reached.0 > best.0 || (reached.0 == best.0 && reached.1 < best.1) {
