@@ -73,16 +73,14 @@ pub fn change_points(values: &[f64], alpha: f64) -> Vec<Change> {
     let clean = without_outliers(&scaled);
     let least = EFFECT_MIN * middle.abs() / size;
     // The variance below which noise is not distinguished from none.
-    let floor = (least / 4.0).max(1e-9).powi(2);
-    let mut model = Model::select(&clean, floor);
+    let mut model = Model::select(&clean, (least / 4.0).max(1e-9).powi(2));
     let p_values = model.steps(least, alpha);
-    let edges = model.edges();
     let step = |(w, p): (&[usize], f64)| {
         let at = w[1];
         let (before, after) = (median_of(&values[w[0]..at]), median_of(&values[at..w[2]]));
         Change { at, before, after, p }
     };
-    edges.windows(3).zip(p_values).map(step).collect()
+    model.edges().windows(3).zip(p_values).map(step).collect()
 }
 
 /// A model of values without outliers.
@@ -208,8 +206,7 @@ fn without_outliers(values: &[f64]) -> Vec<f64> {
     let (n, width) = (values.len(), NEIGHBOURHOOD.min(values.len()));
     let differences: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     // The median of |x - y| of two normal values, in standard deviations.
-    let deviation = median_of(&differences) / (0.6745 * std::f64::consts::SQRT_2);
-    let limit = OUTLIER * deviation;
+    let limit = OUTLIER * (median_of(&differences) / (0.6745 * std::f64::consts::SQRT_2));
     if limit == 0.0 {
         // One other value is no level.
         let mut clean = values.to_vec();

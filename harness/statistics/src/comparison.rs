@@ -60,10 +60,8 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let difference = |of: usize, r: &Round| r[of] - (r[(of + 1) % 3] + r[(of + 2) % 3]) / 2.0;
     let differences: Vec<f64> = rounds.iter().map(|r| difference(2, r)).collect();
     let effect = trimmed_mean(differences.iter().copied());
-    let mut permuted_effect = || {
-        let relabelled = rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r));
-        trimmed_mean(relabelled).abs()
-    };
+    let mut permuted_effect =
+        || trimmed_mean(rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r))).abs();
     let (mut as_large, mut drawn) = (0, 0);
     while drawn < PERMUTATIONS_MAX && as_large < EXCEEDANCES_MAX {
         as_large += usize::from(permuted_effect() >= effect.abs());
@@ -72,12 +70,10 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let of_baseline = rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE);
     let of_baseline: Vec<f64> = of_baseline.collect();
     let null_effects = sorted((0..SAMPLES).map(|_| {
-        let flipped = of_baseline.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
-        trimmed_mean(flipped).abs()
+        trimmed_mean(of_baseline.iter().map(|d| if random.below(2) == 0 { *d } else { -d })).abs()
     }));
     let bootstrap_effects = sorted((0..SAMPLES / 4).map(|_| {
-        let drawn = differences.iter().map(|_| differences[random.below(differences.len())]);
-        trimmed_mean(drawn)
+        trimmed_mean(differences.iter().map(|_| differences[random.below(differences.len())]))
     }));
     let floor = quantile(&null_effects, 1.0 - alpha);
     let relative = |logarithm: f64| logarithm.exp_m1();

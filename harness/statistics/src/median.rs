@@ -42,11 +42,10 @@ pub fn median(values: &[f64]) -> Option<Median> {
     if n == 0 {
         return None;
     }
-    let value = middle(&sorted);
     // The narrowest interval with the desired coverage; the whole range if none has it.
     let cut = (0..n.div_ceil(2)).rev().find(|&k| coverage(n, k) >= COVERAGE).unwrap_or(0);
     let (low, high) = (sorted[cut], sorted[n - 1 - cut]);
-    Some(Median { value, low, high, coverage: coverage(n, cut), count: n })
+    Some(Median { value: middle(&sorted), low, high, coverage: coverage(n, cut), count: n })
 }
 
 /// Returns the median of a non-empty slice.

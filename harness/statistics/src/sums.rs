@@ -121,8 +121,7 @@ impl Products {
         let mut equations: Vec<Vec<f64>> = chosen.iter().map(equation).collect();
         for (i, term) in chosen.iter().enumerate() {
             let pivot = equations[i][i];
-            let is_new = pivot > INDEPENDENT * self.of[*term][*term];
-            let scale = if is_new { 1.0 / pivot } else { 0.0 };
+            let scale = if pivot > INDEPENDENT * self.of[*term][*term] { 1.0 / pivot } else { 0.0 };
             let scaled: Vec<f64> = equations[i].iter().map(|entry| scale * entry).collect();
             for equation in &mut equations {
                 let factor = equation[i];
