@@ -59,9 +59,8 @@ impl TreeReader {
             return Err(ReadError::Damaged(format!("it has {found} bytes instead of {end}")));
         }
         let (shape, arrays, start) = source.tree(root)?;
-        let expected = metadata(&shape, &arrays, start);
         let found = (source.bytes_at(start, end.saturating_sub(start))?, head);
-        if expected != found {
+        if metadata(&shape, &arrays, start) != found {
             let is_ours = found.0.windows(EDGE.len()).any(|bytes| bytes == EDGE.as_bytes());
             let error = if is_ours { ReadError::Damaged } else { ReadError::Unknown };
             return Err(error("its metadata are not those of its tree".to_owned()));

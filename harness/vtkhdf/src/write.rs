@@ -60,8 +60,7 @@ impl Metadata {
     pub(crate) fn finish(self, root: u64) -> (Vec<u8>, Vec<u8>) {
         let mut superblock = SIGNATURE.to_vec();
         superblock.extend([3, 8, 8, 0]);
-        let addresses = [0, UNDEFINED, self.end(), root].map(u64::to_le_bytes);
-        superblock.extend(addresses.as_flattened());
+        superblock.extend([0, UNDEFINED, self.end(), root].map(u64::to_le_bytes).as_flattened());
         close(&mut superblock);
         (self.bytes, superblock)
     }
@@ -124,8 +123,7 @@ impl Metadata {
         layout.extend([INDEX_FIXED_ARRAY, PAGE_BITS].into_iter().chain(table.to_le_bytes()));
         add_message(&mut header, message::LAYOUT, &layout);
         // One filter, zlib (1), not optional, with one parameter.
-        let filter = [2, 1, 1, 0, 0, 0, 1, 0, LEVEL as u8, 0, 0, 0];
-        add_message(&mut header, message::FILTERS, &filter);
+        add_message(&mut header, message::FILTERS, &[2, 1, 1, 0, 0, 0, 1, 0, LEVEL as u8, 0, 0, 0]);
         self.header(&header)
     }
 
