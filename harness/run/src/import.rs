@@ -81,14 +81,12 @@ pub fn import(
     let has_use = format == Format::Table || request.position == Position::default();
     Failure::unless(has_use, "the position of cells is for tables: omit it").map_err(input)?;
     if format == Format::Vtk {
-        let sides = request.sides.as_deref();
-        let tree = ImportedTree::open(path, sides, root, case, program.clone());
+        let tree = ImportedTree::open(path, request.sides.as_deref(), root, case, program.clone());
         if let Some(tree) = tree.map_err(input)? {
             return Ok(Imported::Tree(Box::new(tree)));
         }
     }
-    let is_root_of_case = request.root.is_none();
-    let request = Request { root, is_root_of_case, ..request.clone() };
+    let request = Request { root, is_root_of_case: request.root.is_none(), ..request.clone() };
     let cells = read(path, format, &request, &Paths::find(), limit);
     let cells = cells.map_err(|failure| failure.of_file(path))?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);

@@ -96,8 +96,7 @@ pub fn ask(
     let sent: Vec<Result<(), Failure>> = oracles.iter().map(send).collect();
     let answer = |(&oracle, sent): (&&str, Result<(), Failure>)| {
         sent?;
-        let watch = Watch::new(oracle, limit, place);
-        services.answer(oracle, &watch).map_err(explained)?;
+        services.answer(oracle, &Watch::new(oracle, limit, place)).map_err(explained)?;
         let inside = read_sides(&place.join(oracle), points.len());
         let inside = inside.map_err(|why| Failure::new(oracle, End::Unusable(why)))?;
         Ok(Answer { name: oracle.to_owned(), inside })

@@ -137,8 +137,7 @@ impl Engine {
     /// The leaf-set directory of the mesh of a run, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let always = self.description.run.always_writes_mesh();
-        let unrequested = always.then(|| options.place.join("mesh"));
-        options.mesh.map(Path::to_owned).or(unrequested)
+        options.mesh.map(Path::to_owned).or(always.then(|| options.place.join("mesh")))
     }
 
     /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file
@@ -247,10 +246,9 @@ impl Engine {
             }
         }
         if let Some(reported) = report.ranks.filter(|&reported| reported != ranks) {
-            let launcher = self.launcher.program();
             return Err(format!(
                 "was to run on {ranks} ranks, but reports {reported}: if on MPI, it was built without it, or for another than that of {}",
-                launcher.display()
+                self.launcher.program().display()
             ));
         }
         let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
@@ -380,8 +378,7 @@ impl Programs {
 
     /// The engine of this name, or that is called so in results: the mesher, the reference or an engine under test.
     pub fn named(&self, name: &str) -> &Engine {
-        let own = [&self.mesher, &self.reference];
-        let mut all = own.into_iter().chain(&self.others);
+        let mut all = [&self.mesher, &self.reference].into_iter().chain(&self.others);
         all.find(|engine| engine.name() == name || engine.label() == name).unwrap_or(&self.engine)
     }
 }

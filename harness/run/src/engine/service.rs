@@ -126,8 +126,7 @@ impl Service {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors.try_clone()?);
         let (session, (requests, output)) = Session::start(command)?;
         let answers = lines_of(output.expect("it is a pipe"))?;
-        let sent = Instant::now();
-        Ok(Self { session, requests, answers, errors, sent, _shared: shared })
+        Ok(Self { session, requests, answers, errors, sent: Instant::now(), _shared: shared })
     }
 
     /// The wall time from request to answer, in seconds.

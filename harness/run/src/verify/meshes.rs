@@ -59,8 +59,7 @@ impl CaseRun<'_> {
     ) -> Result<Meshed, Failure> {
         let (run, ranks) = self.run(case, name, program, Some(tree), layout)?;
         let place = self.place.join(name).join("mesh");
-        let mesh = self.program(program).read_mesh(&place)?;
-        Ok(Meshed { run, ranks, mesh, place })
+        Ok(Meshed { run, ranks, mesh: self.program(program).read_mesh(&place)?, place })
     }
 
     /// A run that writes a mesh only if `tree` is one, or the engine cannot do without; and the number of ranks that it reports.
@@ -157,8 +156,7 @@ impl CaseRun<'_> {
             return;
         }
         let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
-        let is_same = *first == second && timed.cells == mesh.words.len() as u64;
-        let outcome = match is_same {
+        let outcome = match *first == second && timed.cells == mesh.words.len() as u64 {
             true => Outcome::held(mesh.words.len() as u64),
             false => Outcome::fail(format!(
                 "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
@@ -254,8 +252,7 @@ impl CaseRun<'_> {
         for layout in self.all.options.layouts(self.engine()) {
             let subject = layout.to_string();
             if self.report.checks.iter().all(|check| check.subject != subject) {
-                let check = Check::new(subject, RUNS, Outcome::left_out(why));
-                self.add(check, Some(&layout));
+                self.add(Check::new(subject, RUNS, Outcome::left_out(why)), Some(&layout));
             }
         }
     }
@@ -269,8 +266,7 @@ impl CaseRun<'_> {
         let meshed = self.mesh(&self.file, &name, MESHER, Tree::Final, layout)?;
         self.report.runs.push(meshed.run);
         let mut check = Check::new(&*subject, RUNS, Outcome::held(2));
-        let is_first = self.report.checks.iter().all(|check| check.ranks.is_none());
-        if is_first && meshed.ranks.is_none() {
+        if self.report.checks.iter().all(|check| check.ranks.is_none()) && meshed.ranks.is_none() {
             check.notes.push(DOUBT.to_owned());
         }
         self.add(check, Some(layout));

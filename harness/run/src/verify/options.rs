@@ -182,8 +182,7 @@ impl Needs {
             let declined = is_declined.then(|| format!("--no-{} was given", need.name()));
             Some((need, unused.or(declined).or(missing)?))
         };
-        let absent = all.into_iter().filter_map(why).collect();
-        let needs = Self { absent, ..Self::default() };
+        let needs = Self { absent: all.into_iter().filter_map(why).collect(), ..Self::default() };
         if needs.lacks(Need::Mpi).is_none() {
             let counts = options.rank_counts(engine).into_iter();
             counts.for_each(|ranks| programs.engine.start_ranks(ranks, &needs.services));
@@ -237,14 +236,12 @@ impl Needs {
         let of_definition = engine.promises.definition.then_some(false);
         let (ranks, parallel) = (options.ranks.is_some(), !engine.run.parallel.is_empty());
         let of_ranks = engine.promises.is_independent_of(Independence::Ranks) && parallel;
-        let of_ranks = (ranks || parallel).then_some(!options.no_mpi && (ranks || of_ranks));
-        let nothing = unchecked.len() == cases.len() || !options.cases.is_empty();
         // Without `--require`, whether it is required; `None` if the engine has no use of it.
         let required = |need| match need {
-            Need::Mpi => of_ranks,
+            Need::Mpi => (ranks || parallel).then_some(!options.no_mpi && (ranks || of_ranks)),
             Need::Oracles | Need::P4est | Need::Proof => of_definition,
             Need::Geometries => Some(false),
-            Need::Checks => Some(nothing),
+            Need::Checks => Some(unchecked.len() == cases.len() || !options.cases.is_empty()),
         };
         let missing = absent.into_iter().filter_map(|(need, why)| {
             let required = if options.require.contains(&need) { true } else { required(need)? };

@@ -65,9 +65,8 @@ impl CaseRun<'_> {
     /// Has the proven checker judge the mesh, given its base tree.
     fn prove(&self, step: Step, serial: &Meshed, base: &Meshed) -> Result<Check, Failure> {
         let options = self.all.options;
-        let checker = &self.all.programs.paths.proven_checker;
         let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
-        match proven(checker, places, leaves, options.timeout) {
+        match proven(&self.all.programs.paths.proven_checker, places, leaves, options.timeout) {
             Ok(proof) => Ok(Check::of_result(step.0, CheckResult { name: step.1, ..proof })),
             // The files of another program may lack what the proof needs.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
@@ -113,9 +112,8 @@ impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
     fn balance(&self, (subject, name): Step, base: &Meshed) -> Result<Check, Failure> {
-        let place = self.place.join("plain-case");
         let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
-        let written = plain(case).write(&place, StlForm::Any)?;
+        let written = plain(case).write(&self.place.join("plain-case"), StlForm::Any)?;
         let mesh = self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh;
         match self.balance_by_p4est(&base.place) {
             Ok(words) => {
