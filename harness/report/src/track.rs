@@ -100,12 +100,11 @@ fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
 pub fn summary(all: &[Series]) -> String {
     let line = |series: &Series, change: &Change| {
         let [before, after, by] = values(series, change);
-        let commits = [&change.last_old, &change.first_new].map(|commit| short_commit(commit));
         let accepted = if change.accepted { ", accepted" } else { "" };
         format!(
             "{}: {before} -> {after} ({by}) in {}, p = {:.2e}{accepted}\n",
             series.name,
-            commits.join(".."),
+            [&change.last_old, &change.first_new].map(|commit| short_commit(commit)).join(".."),
             change.step.p
         )
     };

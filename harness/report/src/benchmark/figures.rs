@@ -80,15 +80,13 @@ fn over_cells(
     let caption =
         format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
     let (x, y) = (Axis::log("cells"), Axis::log(y));
-    let series = series(all, value);
-    Figure { id, title, caption, x, y, series, ..Figure::default() }
+    Figure { id, title, caption, x, y, series: series(all, value), ..Figure::default() }
 }
 
 /// A value of every group over its cells: a series per program, number and kind of ranks. Programs stay in the order of the record.
 fn series(all: &[&Group], value: impl Fn(&Group) -> Median) -> Vec<Series> {
-    let programs = by_key(all.iter().copied(), |g| &g.setup.engine);
     let mut lines = Vec::new();
-    for (engine, mut groups) in programs {
+    for (engine, mut groups) in by_key(all.iter().copied(), |g| &g.setup.engine) {
         groups.sort_by_key(|g| (g.setup.ranks, g.cells()));
         for ((ranks, _), groups) in by_key(groups, |g| (g.setup.ranks, g.setup.comm)) {
             let how = provenance(groups[0]);

@@ -109,10 +109,9 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
             number("parallel_ranks"),
         );
     }
-    let id = format!("speedup-{file}");
     let title = format!("Speedup: {subject}, {cells} cells");
     let (x, y) = (ranks_axis(all), Axis::log("speedup"));
-    Figure { id, title, caption, x, y, series, ..Figure::default() }
+    Figure { id: format!("speedup-{file}"), title, caption, x, y, series, ..Figure::default() }
 }
 
 /// Global efficiency and its factors on simulated ranks.
@@ -153,9 +152,8 @@ fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) ->
     let id = format!("efficiency-{experiment}-{file}");
     let title = format!("Efficiency in {experiment} scaling: {subject}, {size}");
     let caption = caption.trim_end().to_owned();
-    let x = ranks_axis(sims);
     let y = Axis { range: Some((0.0, highest * 1.1)), ..Axis::linear("efficiency") };
-    Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
+    Some(Figure { id, title, caption, x: ranks_axis(sims), y, series, ..Figure::default() })
 }
 
 /// Useful time per rank: the counterpart of the paper's Figures 21 to 23.

@@ -36,8 +36,7 @@ pub fn text(groups: &Groups) -> String {
 pub fn causes(groups: &Groups) -> Vec<String> {
     let cause = |group: &Group| {
         let (s, cells, how) = (&group.setup, grouped(group.cells()), group.how());
-        let reference = &groups.reference(group).typical;
-        let cause = pop::cause(&group.typical, reference, &group.network);
+        let cause = pop::cause(&group.typical, &groups.reference(group).typical, &group.network);
         format!("{}, {}, {cells} cells, {how}: {cause}", Subject::of(s), s.experiment)
     };
     groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
@@ -86,11 +85,10 @@ fn experiment(groups: &Groups, name: &str) -> Table {
 
 /// Projected and measured times of the same meshes on equally many ranks.
 fn projections(groups: &Groups) -> Table {
-    let pairs = groups.projections();
     let error = |[sim, measured]: &[&Group; 2]| sim.time_s.value / measured.time_s.value - 1.0;
     Table::of(
         "projected and measured times".to_owned(),
-        &pairs,
+        &groups.projections(),
         &[
             ("engine", &|[sim, _]| sim.setup.engine.clone()),
             ("case", &|[sim, _]| sim.setup.case.clone()),

@@ -28,8 +28,7 @@ impl Scale {
     /// That of an axis which shows all `values`, or of names, of which some have labels if they are many.
     pub fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Self {
         if !axis.names.is_empty() {
-            let every = axis.names.len().div_ceil(NAMES_SHOWN);
-            let named = (0..).zip(&axis.names).step_by(every);
+            let named = (0..).zip(&axis.names).step_by(axis.names.len().div_ceil(NAMES_SHOWN));
             let ticks = named.map(|(i, name)| (f64::from(i), name.clone())).collect();
             return Self { log: false, ends: axis.names.len() as f64 - 0.5..-0.5, ticks };
         }

@@ -174,12 +174,11 @@ pub fn table(table: &Table) -> String {
     let length = |i: usize| (longest(table.rows.iter().map(|row| &row[i])) as f64).sqrt();
     let lengths: Vec<f64> = (0..table.columns.len()).map(length).collect();
     let share = |length: &f64| 0.94 * length / lengths.iter().sum::<f64>();
-    let columns = lengths.iter().map(|of| format!("p{{{:.3}\\linewidth}}", share(of)));
     format!(
         "\n\\subsection*{{{}}}\n{{\\scriptsize\\raggedright\\tabcolsep=0.007\\linewidth\n\\noindent\\begin{{tabular}}{{{}}}\n\\hline\n\
          {head}\\hline\n{}\\hline\n\\end{{tabular}}\\par\n{}}}\n",
         escape(&table.title),
-        columns.collect::<String>(),
+        lengths.iter().map(|of| format!("p{{{:.3}\\linewidth}}", share(of))).collect::<String>(),
         rows.collect::<String>(),
         table.notes.iter().map(|note| escape(note) + "\\par\n").collect::<String>()
     )

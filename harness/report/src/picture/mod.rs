@@ -192,11 +192,9 @@ impl Picture {
         fills.retain(|fill| !fill.cells.is_empty());
         let (key, title) = self.colour.legend(&self.key);
         let (plane, Squares { leaves, squares, .. }) = (self.plane_name(), &self.squares);
-        let is_merged = *leaves > squares.len() as u64;
-        let merged = if is_merged { ", the smallest merged" } else { "" };
+        let merged = if *leaves > squares.len() as u64 { ", the smallest merged" } else { "" };
         let caption = format!("{plane}; cells in the plane: {leaves}{merged}");
-        let section = self.section.clone();
-        let map = Some(Map { title, key, fills, section, caption });
+        let map = Some(Map { title, key, fills, section: self.section.clone(), caption });
         let [x, y] = [axis(0), axis(1)];
         svg::svg(&Figure { title: self.title(), x, y, map, ..Figure::default() })
     }
