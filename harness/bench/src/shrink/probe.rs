@@ -100,11 +100,10 @@ impl Probe {
         if let Some(why) = self.engine.description.declines(&case) {
             return Err(left_out(&why));
         }
-        let of_definition = promises.definition.then_some((&self.reference, "the reference"));
         let independent = promises.is_independent_of(Independence::Ranks);
         let (engine, ranks) = (&self.engine, trial.ranks);
         let truth = match ranks {
-            Ranks::Serial => of_definition,
+            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
             _ => independent.then_some((engine, "its serial run")),
         };
         let truth = truth.map(|(engine, name)| {

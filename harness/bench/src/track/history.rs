@@ -116,9 +116,8 @@ impl Record {
         for (case, measures) in cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
             self.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
-            let numbers = exact.into_iter().chain(memory).chain(counted);
             let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
-            self.metrics.extend(numbers.map(named));
+            self.metrics.extend(exact.into_iter().chain(memory).chain(counted).map(named));
         }
         let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(self) };
         let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
@@ -179,8 +178,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         let named = |(mut name, value): (String, f64)| {
             // The others depend on the program and the case alone.
             let of_machine = [MEMORY, "memory", "time", "instructions", "allocations"];
-            let is_rate = is_gain(&name) == Some(true);
-            if is_rate
+            if is_gain(&name) == Some(true)
                 || unit(&name) == "s"
                 || of_machine.iter().any(|of| plain(&name).contains(of))
             {

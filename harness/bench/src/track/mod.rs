@@ -159,8 +159,7 @@ pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
             accepted: is_accepted(step.at, &points, records),
             step,
         };
-        let found = found.into_iter().filter(|_| is_discovery);
-        let changes = found.map(change).collect();
+        let changes = found.into_iter().filter(|_| is_discovery).map(change).collect();
         let series = Series { unit: unit(&name), name, changes, points };
         series.check_invariants(records);
         series
