@@ -127,9 +127,8 @@ impl SelectionArguments {
             };
             Slice::new(root, axis, at).ok_or_else(outside)
         };
-        let slice = slice.map(plane).transpose()?;
         let clip = clip.map(|corners| corners.map(|corner| root.quantise_clamped(corner)));
-        Ok(Selection { clip, level_max, side, rank, slice })
+        Ok(Selection { clip, level_max, side, rank, slice: slice.map(plane).transpose()? })
     }
 }
 
@@ -180,8 +179,7 @@ impl MeshArguments {
         let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
-        let place = (made.path(), self.timeout);
-        let dir = engine.mesh(&prepared, layout, ungraded, place)?;
+        let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), self.timeout))?;
         Ok((Meshed { dir, made: Some(made) }, Some(case)))
     }
 }
@@ -201,9 +199,8 @@ fn clip(text: &str) -> Result<[[f64; 3]; 2], String> {
 /// Parses a plane: its axis and its coordinate along it.
 fn plane(text: &str) -> Result<(usize, f64), String> {
     let parsed = text.split_once('=').and_then(|(axis, at)| {
-        let axis = AXES.iter().position(|name| *name == axis.trim())?;
         let [at] = numbers(at, "").ok()?;
-        Some((axis, at))
+        Some((AXES.iter().position(|name| *name == axis.trim())?, at))
     });
     parsed.ok_or_else(|| "give an axis and a coordinate, such as z=0".to_owned())
 }

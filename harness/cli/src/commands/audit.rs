@@ -58,8 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         let has_edges = forest.connectivity.dimension != 2;
         let why = "quadrants have no edges but their faces: choose --balance faces or corners";
         Failure::unless(has_edges || *balance != Some(Touching::Edge), why)?;
-        let touching = balance.unwrap_or(Touching::Corner);
-        let report = forest::audit(&forest, touching, start);
+        let report = forest::audit(&forest, balance.unwrap_or(Touching::Corner), start);
         return publish(&report, arguments);
     }
     let engine = promises.as_deref().map(promising).transpose()?;

@@ -103,8 +103,7 @@ fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8>
         eprintln!("harness: interrupted: the record contains all results so far");
         return Ok(EXIT_INTERRUPTED);
     }
-    let is_complete = outcome.missing.is_none();
-    Ok(exit_first(code?, if is_complete { EXIT_HOLDS } else { EXIT_MISSING }))
+    Ok(exit_first(code?, if outcome.missing.is_none() { EXIT_HOLDS } else { EXIT_MISSING }))
 }
 
 /// Executes a study, and prints its progress and what is missing.
@@ -135,8 +134,7 @@ fn programs(given: &Given, study: &mut Study) -> Result<Programs> {
     let mut known = HashSet::new();
     let mut labels = names.iter().map(|name| programs.named(name).label());
     if let Some(label) = labels.find(|label| !known.insert(label.clone())) {
-        let why = format!("two programs of one name, {label}: rename a file");
-        return Err(Failure::input(why));
+        return Err(Failure::input(format!("two programs of one name, {label}: rename a file")));
     }
     // Our mesher chooses the spacings, also for other engines.
     let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);

@@ -34,8 +34,7 @@ pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8> {
     {
         let results = forest::diff(&a, &b);
         results.iter().for_each(|result| println!("{result}"));
-        let is_same = results.iter().all(CheckResult::holds);
-        return Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED });
+        return Ok(if results.iter().all(CheckResult::holds) { EXIT_HOLDS } else { EXIT_FAILED });
     }
     let case = source.read_case()?;
     let [of_a, of_b] = [source.open(a, case.as_ref())?, source.open(b, case.as_ref())?];

@@ -40,8 +40,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
     let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
-    let input = Input::read(&arguments.file, requested)?;
-    let diagnosis = diagnose(&input, arguments.limit.get());
+    let diagnosis = diagnose(&Input::read(&arguments.file, requested)?, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {
         put(path, pretty(&diagnosis))?;

@@ -125,8 +125,7 @@ fn has_manifest(mesh: &Path) -> bool {
 /// # Errors
 /// If the mesh cannot be read or written.
 pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8> {
-    let case = source.read_case()?;
-    let mut imported = source.read(mesh, case.as_ref())?;
+    let mut imported = source.read(mesh, source.read_case()?.as_ref())?;
     imported.create(out, false)?;
     let Manifest { leaves, sides, .. } = imported.manifest();
     let known = if *sides == manifest::Sides::Known { "known" } else { "unknown" };

@@ -69,8 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         let spacing = case.root.edge / f64::from(1u32 << level);
         plain.table.insert("spacing_min".into(), spacing.into());
         let file = plain.write(place.path(), StlForm::Binary)?;
-        let limits = (place.path(), arguments.timeout);
-        let mesh = programs.mesher.mesh(&file, &SERIAL, true, limits)?;
+        let mesh = programs.mesher.mesh(&file, &SERIAL, true, (place.path(), arguments.timeout))?;
         let tree = programs.mesher.read_mesh(&mesh)?;
         fs::remove_dir_all(mesh)?;
         Ok(tree)
@@ -110,8 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         );
     }
     print!("{answers}");
-    let leaks = answers.examined.iter().any(|report| report.is_leak);
-    Ok(if leaks { EXIT_FAILED } else { EXIT_HOLDS })
+    Ok(if answers.examined.iter().any(|report| report.is_leak) { EXIT_FAILED } else { EXIT_HOLDS })
 }
 
 /// What to do where there is no start.

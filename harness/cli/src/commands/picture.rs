@@ -44,9 +44,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
     let format = format_of(out)?;
-    let is_possible = ranks.is_none() && !*ungraded || !Path::new(&source.mesh).is_dir();
     let why = "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
-    Failure::unless(is_possible, why)?;
+    Failure::unless(ranks.is_none() && !*ungraded || !Path::new(&source.mesh).is_dir(), why)?;
     let layout = match *ranks {
         Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
         None => SERIAL.clone(),

@@ -130,8 +130,7 @@ fn append(arguments: &Arguments) -> Result<()> {
         let of_commit = Record::of_commit(commit.unwrap_or("HEAD"), repository)?;
         records.push(Record { machine, ..of_commit });
     }
-    let last = records.last_mut().expect("a record");
-    last.metrics.extend(arguments.value.iter().cloned());
+    records.last_mut().expect("a record").metrics.extend(arguments.value.iter().cloned());
     records.retain(|record| !record.metrics.is_empty());
     if records.is_empty() {
         let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
