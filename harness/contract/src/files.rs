@@ -1,7 +1,7 @@
 //! Reading without waiting, and files that are either complete or absent.
 
 use crate::failure::{Failure, Result};
-use ::files::Draft;
+use ::files::{Draft, folder_of};
 use std::fs::{self, File, Permissions};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
@@ -42,7 +42,7 @@ impl Staging {
     /// # Errors
     /// If the directory is missing or not writable.
     pub fn beside(path: &Path) -> io::Result<Self> {
-        Self::inside(directory_of(path))
+        Self::inside(folder_of(path))
     }
 
     /// An empty directory in this one.
@@ -77,13 +77,9 @@ impl Staging {
     }
 }
 
-fn directory_of(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// The nearest directory above a path that exists.
 pub fn nearest_directory(path: &Path) -> &Path {
-    path.ancestors().map(directory_of).find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
+    path.ancestors().map(folder_of).find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]
@@ -93,7 +89,7 @@ mod tests {
     #[test]
     fn a_staged_directory_is_removed_unless_it_is_moved() {
         assert_eq!(
-            ["a/b", "b", "/b"].map(|path| directory_of(Path::new(path))),
+            ["a/b", "b", "/b"].map(|path| folder_of(Path::new(path))),
             ["a", ".", "/"].map(Path::new)
         );
         let place = tempfile::tempdir().unwrap();

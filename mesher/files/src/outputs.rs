@@ -165,7 +165,8 @@ fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
     })
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The directory that has a file, which `.` is for a plain name.
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
