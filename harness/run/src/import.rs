@@ -105,8 +105,7 @@ fn parts(path: &Path) -> Vec<PathBuf> {
         let quote = rest.chars().next()?;
         rest[quote.len_utf8()..].split(quote).next()
     });
-    let beside = path.parent().unwrap_or(Path::new(""));
-    entries.map(|entry| entry.path()).chain(named.map(|name| beside.join(name))).collect()
+    entries.map(|entry| entry.path()).chain(named.map(|name| path.with_file_name(name))).collect()
 }
 
 /// What a file states besides corners and edges of its cells.
