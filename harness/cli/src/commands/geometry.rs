@@ -42,9 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
     let diagnosis = diagnose(&Input::read(&arguments.file, requested)?, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
-    if let Some(path) = &arguments.json {
-        put(path, pretty(&diagnosis))?;
-    }
+    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(&diagnosis)))?;
     Ok(match () {
         () if diagnosis.changes_region => EXIT_FAILED,
         () if diagnosis.is_incomplete() => EXIT_MISSING,
