@@ -249,7 +249,8 @@ fn deepest_brick_of(n: usize, boundaries: &[Boundary]) -> Level {
     let spanned = boundaries[1..].windows(n - 1).map(|inner| {
         // The smallest octant that contains the end of the first interval and the start of the last.
         let differ = (inner[0].0 - 1) ^ inner[n - 2].0;
-        LEVEL_MAX - (64 - differ.leading_zeros()).div_ceil(3) + 2
+        let up = (64 - differ.leading_zeros()).div_ceil(3);
+        LEVEL_MAX - up + 2
     });
     spanned.max().unwrap_or(1)
 }
