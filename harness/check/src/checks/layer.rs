@@ -5,7 +5,7 @@
 //! `keep` is `all`, for every l. Every leaf less than n - 1 cells of level D from a crossing leaf of level D has
 //! at least level D. If crossing leaves are deleted, leaves adjacent to one have at least level D: by the extra layer
 //! of section 6 for n < 3, and by the layers themselves for larger n. The check detects neither layers that are too
-//! thick nor, without T0, missing layers around deleted crossing leaves. With n = 1, the minimum distance is that of the
+//! thick nor, without the case, missing layers around deleted crossing leaves. With n = 1, the minimum distance is that of the
 //! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
