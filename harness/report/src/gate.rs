@@ -13,9 +13,11 @@ use std::time::Duration;
 pub fn text(report: &GateReport) -> String {
     let baseline = report.baseline.iter().map(|measured| format!(" against baseline {measured}"));
     let mut text = format!("candidate {}{}\n", report.candidate, baseline.collect::<String>());
-    // Unchanged times are shown, too: their notes state how certain they are.
-    let is_shown = |layer: &Layer, finding: &GateFinding| {
-        finding.verdict != Verdict::Unchanged || layer.name == LayerName::Time
+    // Unchanged times are shown, too, because their notes state how certain they are, and checks that fail as before.
+    let is_shown = |layer: &Layer, finding: &GateFinding| match layer.name {
+        LayerName::Time => true,
+        LayerName::Correctness if finding.candidate > Some(0.0) => true,
+        _ => finding.verdict != Verdict::Unchanged,
     };
     for layer in &report.layers {
         text += &format!("{:<13} {}\n", layer.name, summary(layer));
@@ -153,6 +155,19 @@ mod tests {
             text.contains("REGRESSION in counters") && text.contains("left out: no valgrind"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_check_that_fails_as_before_is_shown() {
+        let failing = |count: f64| {
+            let mut report = sample();
+            let finding = GateFinding::noted("cube", "serial: layer", Verdict::Unchanged, "thin");
+            report.layers[0].name = LayerName::Correctness;
+            report.layers[0].findings = vec![finding.of_values([count, count])];
+            text(&report)
+        };
+        assert!(failing(4.0).contains("unchanged    cube: serial: layer 4 -> 4"));
+        assert!(!failing(0.0).contains("serial: layer"));
     }
 
     #[test]

@@ -4,13 +4,13 @@ use super::Study;
 use super::file::Series;
 use super::judge::of_last_origin;
 use crate::experiments::cases::Base;
-use crate::experiments::entry::Line;
+use crate::experiments::entry::{Line, Run};
 use crate::{name_of, read_toml};
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
 use run::engine::paths::Paths;
 use run::engine::runner::Engine;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use toml::{Table, Value};
@@ -67,21 +67,24 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<()> 
         let why = "the record has a run that the study does not ask for";
         return Err(Failure::input(format!("{why}, {setup}: give the study that made it")));
     }
-    let (place, mut known) = (tempfile::tempdir()?, BTreeMap::new());
+    let place = tempfile::tempdir()?;
     let last = of_last_origin(lines);
-    for run in last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty()) {
+    let of_run = |run: &Run| {
         let s = &run.setup;
         let is_of = |of: &&Series| name_of(&of.experiment) == s.experiment && of.name() == s.case;
         let (case, per_rank) = match study.series.iter().find(is_of) {
             Some(of) => (&of.case, of.facets.map(|facets| [facets, s.ranks])),
             None => (&study.mesh[&s.case].case, None),
         };
-        if !known.contains_key(&(case, per_rank)) {
-            let path = paths.catalogue.case_file(case, &study.directory)?;
-            known.insert((case, per_rank), Base::read(&path, per_rank, place.path())?.inputs);
-        }
-        let why = format!("{case}: rules or geometry are not those of the record's runs");
-        Failure::unless(known[&(case, per_rank)] == run.inputs, why)?;
+        (case, per_rank, run.inputs.clone())
+    };
+    // Older runs do not state their inputs.
+    let runs = last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty());
+    for (case, per_rank, inputs) in runs.map(of_run).collect::<BTreeSet<_>>() {
+        let path = paths.catalogue.case_file(case, &study.directory)?;
+        let base = Base::read(&path, per_rank, place.path())?;
+        let why = "rules or geometry are not those of the record's runs";
+        Failure::unless(base.inputs == inputs, format!("{case}: {why}"))?;
     }
     Ok(())
 }
