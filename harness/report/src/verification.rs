@@ -191,6 +191,17 @@ mod tests {
     use run::testing::report as sample;
 
     #[test]
+    fn an_interrupt_is_an_error_of_junit() {
+        let mut report = sample();
+        let errors = |report: &Report| {
+            quick_junit::Report::deserialize_from_str(&junit(report)).unwrap().errors
+        };
+        let before = errors(&report);
+        report.interrupted = true;
+        assert_eq!(errors(&report), before + 1);
+    }
+
+    #[test]
     fn the_serial_run_and_every_rank_count_have_a_line() {
         let text = table(&sample());
         let lines: Vec<Vec<&str>> =

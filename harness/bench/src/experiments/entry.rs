@@ -44,7 +44,8 @@ impl Line {
     pub fn is_possible(&self) -> bool {
         match &self.entry {
             Entry::Network(network) => network.is_possible(),
-            Entry::Run(run) => run.is_possible(),
+            // Only a coarser mesh, by which a spacing is found, may have no cells.
+            Entry::Run(run) => run.cells > 0 && run.is_possible(),
             _ => true,
         }
     }
@@ -362,8 +363,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it has cells; ranks, at most a million, of which all values are stored, or none; and a wall time, which is at most that of the launcher and at least that of any phase;
-    /// times that a clock can show; and sums that are those of the ranks and of the phases.
+    /// Whether it has ranks, at most a million, of which all values are stored, or none; a wall time, which is at most that of the launcher
+    /// and at least that of any phase; times that a clock can show; and sums that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
@@ -382,7 +383,6 @@ impl Run {
             && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
             && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)
             && are_times(times.chain(of_run))
-            && self.cells > 0
             && spreads.all(|of| of.is_possible() && is_of_all(of))
             && (phases.is_empty() || !is_by_rank || (useful_s.sum - total).abs() <= off)
     }

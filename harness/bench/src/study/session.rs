@@ -414,6 +414,7 @@ impl Session<'_> {
     /// Requires runs that must have the same mesh to report the same: the time of a wrong mesh is not a result. The mesh of an
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
     fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<()> {
+        Failure::unless(run.cells > 0, "the mesh has no cells")?;
         let engine = self.runner.programs.named(&point.setup.engine);
         let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {

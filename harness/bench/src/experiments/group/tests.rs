@@ -215,7 +215,7 @@ fn impossible_numbers_of_a_line_are_noticed() {
         line_of(run).is_possible()
     };
     assert!(is_possible(|_| ()));
-    let faults: [fn(&mut Run); 13] = [
+    let faults: [fn(&mut Run); 15] = [
         |run| run.phases[0].messages.sum = -1e6,
         |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
         |run| run.peak_rss_bytes.sum = 1.0,
@@ -229,6 +229,8 @@ fn impossible_numbers_of_a_line_are_noticed() {
         |run| run.phases[0].useful_s.by_rank[1] = -1.0,
         |run| run.useful_s.max = f64::NAN,
         |run| run.setup.ranks = 0,
+        |run| run.setup.ranks = 3,
+        |run| run.cells = 0,
     ];
     assert!(!faults.into_iter().any(is_possible));
     let network = Network { latency_s: -1.0, bandwidth_bytes_per_s: 1.0, measured: true };
