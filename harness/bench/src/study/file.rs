@@ -257,7 +257,7 @@ impl Study {
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
         let of_series = self.series.iter().map(|series| &series.case);
-        // In the names of results, punctuation is the same.
+        // Names of results have `-` in place of punctuation, so that these would be the same.
         let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         for case in of_series.chain(self.mesh.values().map(|mesh| &mesh.case)) {
             let name = Path::new(case).file_stem().map(|name| plain(&name.to_string_lossy()));
