@@ -41,6 +41,14 @@ impl Parity {
         }
         odd
     }
+
+    /// How many times facets that are wound outward enclose this point, which is on no facet: a ray along +x leaves a body through them.
+    pub fn winding(&self, point: [i64; 3]) -> i64 {
+        let facets = self.grids[0].candidates(project(point, 0)).iter();
+        let facets = facets.map(|&i| &self.facets[i as usize]);
+        let passed = facets.filter(|facet| crosses(facet, point, 0) == Some(true));
+        passed.map(|facet| normal(facet)[0].signum()).sum()
+    }
 }
 
 /// The two coordinates that are constant along `axis`: those along axis + 1 and axis + 2.

@@ -28,6 +28,8 @@ pub enum Kind {
     Duplicates,
     /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
     Intersections,
+    /// Facets with two solids, four, ... on their inner side.
+    Overlaps,
     /// Facets with an opposite facet less than one cell away, on the inner side, but not of another solid; by rays.
     ThinWalls,
     /// Facets with an opposite facet less than one cell away, on the outer side.
@@ -99,7 +101,7 @@ impl Kind {
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
             Self::NonManifoldOdd | Self::Stray | Self::Duplicates => true,
-            Self::Rounded | Self::OutsideRoot => true,
+            Self::Overlaps | Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -126,6 +128,8 @@ impl Kind {
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
             Self::Intersections => ("intersecting pairs of facets",
                 "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
+            Self::Overlaps => ("facets within another solid",
+                "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity. Unite them if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
                 "No cell fits into the wall: it consists of crossing leaves, without an inside."),
             Self::ThinGaps => ("facets at thin gaps",
@@ -287,6 +291,7 @@ mod tests {
             Kind::Stray,
             Kind::Duplicates,
             Kind::Intersections,
+            Kind::Overlaps,
             Kind::ThinWalls,
             Kind::ThinGaps,
             Kind::OutsideRoot,
@@ -296,7 +301,7 @@ mod tests {
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
         assert!(
-            meanings[12].starts_with("No effect: the facets overlap back to back in one plane")
+            meanings[13].starts_with("No effect: the facets overlap back to back in one plane")
         );
         assert!(meanings[7].starts_with("Where two closed shells overlap"));
         meanings.sort();
@@ -307,7 +312,7 @@ mod tests {
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
-        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Duplicates];
+        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Duplicates, Kind::Overlaps];
         let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(

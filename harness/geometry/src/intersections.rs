@@ -5,9 +5,11 @@
 //! normal to an edge of either.
 
 use contract::lattice::{FacetLattice, bounds, cross, difference, dot, normal};
+use contract::parity::Parity;
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use super::shells::Shells;
 use super::tree::FacetTree;
 
 /// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or is back to back in
@@ -45,6 +47,28 @@ pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
         places: pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect(),
         ..Finding::new(Kind::Intersections)
     }
+}
+
+/// Facets with an even number of solids on their inner side, in the middle. The surfaces that bound them may cross only where facets of both have
+/// edges, so that no pair intersects. Only closed shells of consistent winding count.
+pub fn overlaps(input: &Input, tree: &FacetTree, shells: &Shells, first: usize) -> Finding {
+    let solids = tree.firsts.iter().filter_map(|&f| {
+        let [a, b, c] = input.case.facets_lattice[f as usize];
+        Some((f, if shells.outward(f)? { [a, b, c] } else { [a, c, b] }))
+    });
+    let (numbers, facets): (Vec<u32>, Vec<FacetLattice>) = solids.unzip();
+    let (parity, mut finding) = (Parity::new(&facets), Finding::new(Kind::Overlaps));
+    for (&f, facet) in numbers.iter().zip(&facets).filter(|(_, facet)| normal(facet) != [0; 3]) {
+        let n = normal(facet).map(|c| c as f64);
+        let step = 3.0 * ROUNDING / n.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let behind =
+            |a: usize| (facet[0][a] + facet[1][a] + facet[2][a]) / 3 - (step * n[a]).round() as i64;
+        let solids = parity.winding(std::array::from_fn(behind));
+        if solids > 0 && solids % 2 == 0 {
+            finding.add(first, || Place::new(vec![f], input.centroid(f)));
+        }
+    }
+    finding
 }
 
 /// Whether the interiors of two triangles with area, as sets of their planes, have a common point.

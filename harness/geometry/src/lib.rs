@@ -36,6 +36,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
     findings.push(intersections::intersections(input, &tree, first));
+    findings.push(intersections::overlaps(input, &tree, &shells, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, &shells, cell));
         findings.push(finding::rounded(input, cell, first));

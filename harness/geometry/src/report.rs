@@ -1,4 +1,4 @@
-//! The result of a diagnosis as data, as JSON of the schema `octree-geometry/5` when serialised, and for a terminal.
+//! The result of a diagnosis as data, as JSON of the schema `octree-geometry/6` when serialised, and for a terminal.
 //!
 //! Invariants, which [`Diagnosis::check_invariants`] executes:
 //! - edges by class sum to all, and three times the facets of shells to the facets at edges;
@@ -19,7 +19,7 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Extent;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-geometry/5";
+pub const SCHEMA: &str = "octree-geometry/6";
 
 /// The shells in numbers.
 #[derive(Clone, Debug, Serialize)]

@@ -47,7 +47,8 @@ pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [F
             !facets[0].iter().any(|v| facets[1].contains(v))
                 && (kind == Kind::ThinGaps || !shells.are_different_solids(p, q))
         };
-        let normal = |facet: u32| Some(tree.triangle(facet).normal()? * shells.sign(facet));
+        let sign = |facet| if shells.outward(facet) == Some(false) { -1.0 } else { 1.0 };
+        let normal = |facet: u32| Some(tree.triangle(facet).normal()? * sign(facet));
         let (mut hits, is_lower_bound) = hits(tree, side, cell / unit, normal, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
         // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.

@@ -103,11 +103,11 @@ impl Shells {
         Self { all, of }
     }
 
-    /// 1 if the normal of a facet points out of the solid that its shell bounds, or -1; 1 if its shell bounds none.
-    pub fn sign(&self, facet: u32) -> f64 {
-        let shell = self.all.get(self.of[facet as usize] as usize);
-        let is_inward = |shell: &Shell| (shell.volume_sixfold < 0) != shell.is_nested;
-        if shell.is_some_and(|shell| shell.is_oriented && is_inward(shell)) { -1.0 } else { 1.0 }
+    /// Whether the normal of a facet points out of the solid that its shell bounds; none if its shell is open, or its winding inconsistent.
+    pub fn outward(&self, facet: u32) -> Option<bool> {
+        let shell = self.all.get(self.of[facet as usize] as usize)?;
+        let is_inward = (shell.volume_sixfold < 0) != shell.is_nested;
+        shell.is_oriented.then_some(!is_inward)
     }
 
     /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.

@@ -217,6 +217,52 @@ fn boxes_that_overlap_with_flush_sides_change_the_region() {
     assert!(found.finding(Kind::Intersections).unwrap().count_changing >= 4);
 }
 
+/// A box whose faces consist of squares with edge 1.
+fn squared(low: [f32; 3], high: [f32; 3]) -> Vec<Facet> {
+    let faces = cuboid(low, high);
+    let split = |face: &[Facet]| {
+        let ([a, b, _], [_, _, d]) = (face[0], face[1]);
+        let at = |to: [f32; 3]| [0, 1, 2].map(|x| to[x] - a[x]);
+        let (u, w) = (at(b), at(d));
+        let [m, n] = [u, w].map(|v| v.iter().fold(0, |sum, c| sum + c.abs() as i32));
+        let point = |i: i32, j: i32| {
+            let part = |v: [f32; 3], x: usize, i: i32, n: i32| v[x] * i as f32 / n as f32;
+            [0, 1, 2].map(|x| a[x] + part(u, x, i, m) + part(w, x, j, n))
+        };
+        let square =
+            |i, j| quad([point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)]);
+        (0..m)
+            .flat_map(|i| (0..n).flat_map(move |j| square(i, j)).collect::<Vec<_>>())
+            .collect::<Vec<_>>()
+    };
+    faces.chunks(2).flat_map(split).collect()
+}
+
+/// Where the surfaces cross, facets of both have edges, so that no pair intersects.
+#[test]
+fn solids_that_overlap_at_edges_of_their_facets_change_the_region() {
+    let cube = squared([0.0; 3], [4.0; 3]);
+    // Each unit square has two facets: those of the cube's within the other, and the reverse.
+    for (low, high, within) in [
+        ([2.0, 1.0, 1.0], [6.0, 3.0, 3.0], 2 * (4 + 4 + 4 * 4)),
+        // The edges of one are on those of the other, which makes them one shell.
+        ([2.0; 3], [6.0; 3], 2 * 6 * 4),
+    ] {
+        let found = diagnosis([cube.clone(), squared(low, high)].concat(), None);
+        assert_eq!(counts(&found), [(Kind::Overlaps, within)]);
+        assert!(found.changes_region);
+    }
+    // A face in common, a cavity, and a cavity that is wound like a solid.
+    let beside = squared([4.0, 1.0, 1.0], [6.0, 3.0, 3.0]);
+    let mut cavity = squared([1.0; 3], [3.0; 3]);
+    let nested = diagnosis([cube.clone(), cavity.clone()].concat(), None);
+    cavity.iter_mut().for_each(|f| f.swap(0, 1));
+    for other in [beside, cavity] {
+        assert_eq!(count(&diagnosis([cube.clone(), other].concat(), None), Kind::Overlaps), 0);
+    }
+    assert_eq!(count(&nested, Kind::Overlaps), 0);
+}
+
 #[test]
 fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
     let mut facets = cube();
@@ -362,7 +408,7 @@ fn facets_on_and_beyond_the_root_are_found() {
 fn json_has_the_schema_and_text_the_findings() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
-    assert_eq!(json["schema"], "octree-geometry/5");
+    assert_eq!(json["schema"], "octree-geometry/6");
     assert_eq!(json["findings"][0]["kind"], "openings");
     assert_eq!(json["findings"][0]["places"][0]["width"], 2.0);
     let text = found.to_string();
