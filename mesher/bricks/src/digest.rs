@@ -38,22 +38,23 @@ widest! {
     pub fn digest(words: &[u64]) -> u128 = digest_lanes;
 }
 
-/// Sums the two 32-bit parts of the low halves separately, so that the loop needs no carry.
+/// Sums the low halves modulo 2^64, and their upper 32 bits alone: the sum of the lower 32 bits follows, and the loop needs no carry.
 #[inline(always)]
 fn digest_lanes(words: &[u64]) -> u128 {
     let mut total = 0u128;
     // Fewer than 2^32 words at a time, so that the sums of 32-bit parts cannot overflow.
     for chunk in words.chunks(1 << 30) {
-        let (mut high, mut low, mut low_top) = (0u64, 0u64, 0u64);
+        let (mut high, mut low, mut top) = (0u64, 0u64, 0u64);
         for &w in chunk {
             let (a, b) = halves(w);
             high = high.wrapping_add(a);
-            low += b & 0xffff_ffff;
-            low_top += b >> 32;
+            low = low.wrapping_add(b);
+            top += b >> 32;
         }
+        let bottom = low.wrapping_sub(top << 32);
         let sum = (u128::from(high) << 64)
-            .wrapping_add(u128::from(low))
-            .wrapping_add(u128::from(low_top) << 32);
+            .wrapping_add(u128::from(bottom))
+            .wrapping_add(u128::from(top) << 32);
         total = total.wrapping_add(sum);
     }
     total

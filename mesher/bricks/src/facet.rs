@@ -27,7 +27,7 @@
 
 use crate::brick::SPANS;
 use crate::octant::{Level, ROOT_BITS};
-use crate::widest;
+use crate::{widest, with_avx512};
 use bytemuck::{Pod, Zeroable};
 
 /// A facet on the lattice.
@@ -165,13 +165,20 @@ widest! {
 #[inline(always)]
 fn lanes(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
     let from = [0, 1, 2].map(|a| i64::from(f.facet.v[0][a]) - corner[a]);
-    let mut mask = plane_mask(from, f.normal, shift);
-    for a in 0..3 {
-        let at = [corner[(a + 1) % 3], corner[(a + 2) % 3]];
-        let met = usize::from(squares(f.sides[a].map(|side| half_plane(side, at, shift))));
-        mask &= COLUMNS[a][0][met & 0xff] | COLUMNS[a][1][met >> 8];
-    }
-    mask
+    let mask = plane_mask(from, f.normal, shift);
+    mask & columns_met(f, corner, shift, 0)
+        & columns_met(f, corner, shift, 1)
+        & columns_met(f, corner, shift, 2)
+}
+
+/// Octants in the columns along an axis that the facet's projection meets.
+#[inline(always)]
+fn columns_met(f: &FacetTest, corner: [i64; 3], shift: u32, a: usize) -> u64 {
+    let at = [corner[(a + 1) % 3], corner[(a + 2) % 3]];
+    let [x, y, z] = f.sides[a];
+    let sides = [half_plane(x, at, shift), half_plane(y, at, shift), half_plane(z, at, shift)];
+    let met = usize::from(squares(sides));
+    COLUMNS[a][0][met & 0xff] | COLUMNS[a][1][met >> 8]
 }
 
 /// A half-plane in units of h: where `ci * (i - 1) + cj * (j - 1) >= least`, the square (i, j) meets it. Square (0, 0) is at `corner`.
@@ -185,16 +192,26 @@ fn half_plane(side: Side, corner: [i64; 2], shift: u32) -> [i32; 3] {
     [side.ci, side.cj, least]
 }
 
-/// Mask of the squares, i fastest, that meet three half-planes. In words as wide as what is compared, which makes it lanes.
-#[inline(always)]
-fn squares(sides: [[i32; 3]; 3]) -> u16 {
-    let mut mask = 0;
-    for k in 0..16 {
-        let [s, t, r] =
-            sides.map(|[ci, cj, least]| ci * ((k & 3) - 1) + cj * ((k >> 2) - 1) >= least);
-        mask |= u32::from(s & t & r) << k;
+with_avx512! {
+    /// Mask of the squares, i fastest, that meet three half-planes.
+    fn squares(sides: [[i32; 3]; 3]) -> u16 {
+        let i = _mm512_setr_epi32(-1, 0, 1, 2, -1, 0, 1, 2, -1, 0, 1, 2, -1, 0, 1, 2);
+        let j = _mm512_setr_epi32(-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2);
+        let times = |c: i32, of: __m512i| _mm512_mullo_epi32(of, _mm512_set1_epi32(c));
+        sides.iter().fold(u16::MAX, |mask, &[ci, cj, least]| {
+            let at = _mm512_add_epi32(times(ci, i), times(cj, j));
+            mask & _mm512_cmpge_epi32_mask(at, _mm512_set1_epi32(least))
+        })
+    } else {
+        // In words as wide as what is compared, which makes it lanes.
+        let mut mask = 0;
+        for k in 0..16 {
+            let [s, t, r] =
+                sides.map(|[ci, cj, least]| ci * ((k & 3) - 1) + cj * ((k >> 2) - 1) >= least);
+            mask |= u32::from(s & t & r) << k;
+        }
+        mask as u16
     }
-    mask as u16
 }
 
 /// Octants that the plane through `from` with normal `n` meets.
@@ -207,30 +224,46 @@ fn plane_mask(from: [i64; 3], n: [i64; 3], shift: u32) -> u64 {
     // n.(i, j, k) + up, and is offset / h on the plane. Beyond 4 * (up - down) < 2^62, no octant of the
     // brick meets the plane. The lanes stay below 3 * 2^60 + 2^60 + 2^62 = 2^63 in magnitude.
     let floor = offset >> shift;
-    if floor.abs() > 4 * i128::from(up - down) {
-        return 0;
-    }
+    // No branch: the processor could not predict it.
+    let is_near = floor.abs() <= 4 * i128::from(up - down);
     let ceil = (offset + ((1 << shift) - 1)) >> shift;
     // Octants (i, j, k) are met where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
-    let (most, least) = (up - ceil as i64, down - floor as i64);
-    // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
-    let mut low = [0i64; 8];
-    for i in 0..8usize {
-        for a in 0..3 {
-            low[i] += n[a] * (i >> a & 1) as i64;
-        }
-    }
-    // A word per lane, which are united in the end.
-    let mut met = [0u64; 8];
-    for byte in 0..8usize {
-        let base = 2 * low[byte] + most;
+    let (most, least) = (up.wrapping_sub(ceil as i64), down.wrapping_sub(floor as i64));
+    // Without signs, negative numbers are beyond `most - least >= 0`: one comparison for both.
+    slab(n, most, most.wrapping_sub(least) as u64) & u64::from(is_near).wrapping_neg()
+}
+
+with_avx512! {
+    /// Octants (i, j, k) where `n.(i, j, k) + most`, without sign, is at most `span`. Lanes enumerate the low bits x0, y0, z0 of the octant's
+    /// index, bytes the high bits x1, y1, z1.
+    fn slab(n: [i64; 3], most: i64, span: u64) -> u64 {
+        let term = |a: usize, lanes: u8| _mm512_maskz_set1_epi64(lanes, n[a]);
+        let low = _mm512_add_epi64(_mm512_add_epi64(term(0, 0xaa), term(1, 0xcc)), term(2, 0xf0));
+        let met = |byte: i64| {
+            let base = (0..3).fold(most, |sum, a| sum.wrapping_add(2 * n[a] * (byte >> a & 1)));
+            let at = _mm512_add_epi64(low, _mm512_set1_epi64(base));
+            u16::from(_mm512_cmple_epu64_mask(at, _mm512_set1_epi64(span as i64)))
+        };
+        let two = |j: i64| u32::from(_mm512_kunpackb(met(2 * j + 1), met(2 * j)));
+        let four = |j: i64| u64::from(_mm512_kunpackw(two(2 * j + 1), two(2 * j)));
+        _mm512_kunpackd(four(1), four(0))
+    } else {
+        let mut low = [0i64; 8];
         for i in 0..8usize {
-            // Without signs, negative numbers are beyond `most - least >= 0`: one comparison for both.
-            let meets = (low[i] + base) as u64 <= (most - least) as u64;
-            met[i] |= u64::from(meets) << (8 * byte + i);
+            for a in 0..3 {
+                low[i] += n[a] * (i >> a & 1) as i64;
+            }
         }
+        // A word per lane, which are united in the end.
+        let mut met = [0u64; 8];
+        for byte in 0..8usize {
+            let base = most.wrapping_add(2 * low[byte]);
+            for i in 0..8usize {
+                met[i] |= u64::from(low[i].wrapping_add(base) as u64 <= span) << (8 * byte + i);
+            }
+        }
+        met.iter().fold(0, |all, of| all | of)
     }
-    met.iter().fold(0, |all, of| all | of)
 }
 
 #[cfg(test)]

@@ -95,6 +95,33 @@ macro_rules! widest {
     };
 }
 
+/// Defines a function with a body of its own for AVX-512, for instructions that the compiler does not find.
+#[macro_export]
+macro_rules! with_avx512 {
+    (
+        $(#[$doc:meta])*
+        $vis:vis fn $name:ident($($arg:ident: $type:ty),*) -> $result:ty { $($avx512:tt)* }
+        else $portable:block
+    ) => {
+        $(#[$doc])*
+        #[inline(always)]
+        $vis fn $name($($arg: $type),*) -> $result {
+            #[cfg(target_arch = "x86_64")]
+            if $crate::wide::width() == $crate::wide::Width::Avx512 {
+                #[inline]
+                #[target_feature(enable = "avx512f,avx512bw")]
+                fn avx512($($arg: $type),*) -> $result {
+                    use std::arch::x86_64::*;
+                    $($avx512)*
+                }
+                // SAFETY: this width is used only on processors with AVX-512 F and BW.
+                return unsafe { avx512($($arg),*) };
+            }
+            $portable
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,8 +4,7 @@
 //! what is stored takes about as much memory.
 
 use bricks::brick::Block;
-#[cfg(target_arch = "x86_64")]
-use bricks::wide;
+use bricks::with_avx512;
 
 /// Number of a local component: leaves of one block that are connected.
 pub type Component = u32;
@@ -131,30 +130,19 @@ impl Masks {
     }
 }
 
-/// The first words, in order, as the halves whose bits are set; the others are empty.
-#[inline(always)]
-fn spread(words: &[u32; HALVES], halves: u16) -> Block {
-    #[cfg(target_arch = "x86_64")]
-    if wide::width() == wide::Width::Avx512 {
-        // SAFETY: this width is used only on processors with AVX-512 F.
-        return unsafe { spread_avx512(words, halves) };
+with_avx512! {
+    /// The first words, in order, as the halves whose bits are set; the others are empty. Measured: one instruction saves 7 % of `sides`.
+    fn spread(words: &[u32; HALVES], halves: u16) -> Block {
+        bytemuck::cast(_mm512_maskz_expand_epi32(halves, bytemuck::cast(*words)))
+    } else {
+        let (mut octants, mut at) = ([0; 8], 0);
+        for k in 0..HALVES {
+            let is_here = halves >> k & 1;
+            octants[k / 2] |= u64::from(words[at % HALVES] * u32::from(is_here)) << (32 * (k % 2));
+            at += usize::from(is_here);
+        }
+        octants
     }
-    let (mut octants, mut at) = ([0; 8], 0);
-    for k in 0..HALVES {
-        let is_here = halves >> k & 1;
-        octants[k / 2] |= u64::from(words[at % HALVES] * u32::from(is_here)) << (32 * (k % 2));
-        at += usize::from(is_here);
-    }
-    octants
-}
-
-/// One instruction: measured to save 7 % of `sides`.
-#[cfg(target_arch = "x86_64")]
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn spread_avx512(words: &[u32; HALVES], halves: u16) -> Block {
-    let words = bytemuck::cast(*words);
-    bytemuck::cast(std::arch::x86_64::_mm512_maskz_expand_epi32(halves, words))
 }
 
 #[cfg(test)]
