@@ -20,7 +20,7 @@ use crate::record::Options;
 use crate::sides::{Base, Sides};
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour, path};
+use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour, path, start57};
 use bricks::tree::{PerLevel, check_octants, check_split};
 use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
@@ -190,9 +190,8 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
 /// The octants of all ranks in the bricks that this rank owns. Collective.
 fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) -> BrickSet {
     let entry = |b: Brick| (ownership.owner(l, b.key), [b.key, b.bits]);
-    let received =
-        comm.sparse_all_to_all(MessageBuffer::of_entries(set.bricks().map(entry).collect()));
-    BrickSet::from_unsorted(received.values())
+    let entries = MessageBuffer::of_entries(set.bricks().map(entry).collect());
+    BrickSet::from_unsorted(comm.sparse_all_to_all(entries).values())
 }
 
 /// The octants one step along an axis from those of a brick of level `l`. Some of the bricks may be empty.
@@ -217,18 +216,13 @@ fn is_in_leaf(leaves: &PerLevel, l: Level, code: u64) -> bool {
     (0..=l).any(|m| leaves[m as usize].contains(code >> (3 * (l - m))))
 }
 
-/// The volume of some octants of a level, in octants of level 19.
-fn volume_of(l: Level, octants: u64) -> u64 {
-    u64::from(octants.count_ones()) << (3 * (LEVEL_MAX - l))
-}
-
 /// The leaves of each rank are linear, and equal in number to the counts. With the deleted ones, those of all ranks tile the root.
 pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
     let (mut end, mut number, mut volume) = (0, 0, 0);
     let Ok(_) = mesh.emit(|words| {
         end = is_linear(end, words);
         number += words.len() as u64;
-        volume += words.iter().map(|w| volume_of(level_of(*w), 1)).sum::<u64>();
+        volume += words.iter().map(|w| volume_of(*w)).sum::<u64>();
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!(total(counts), number, "counts must add up");
@@ -236,8 +230,8 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
     // T0 has no deleted leaves.
     let left_out = once(mesh.sides.deleted()).chain(dropped).flat_map(bricks_of);
     let owned = left_out.filter(|(l, b)| mesh.ownership.owns(*l, b.key));
-    volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
-    assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
+    volume += owned.map(|(l, b)| start57(l, b.bits.count_ones().into())).sum::<u64>();
+    assert_eq!(comm.sum(volume), start57(0, 1), "leaves and deleted leaves must tile the root");
 }
 
 /// Leaves are in order and do not overlap: each begins at the end of the one before it or after that. The first begins at `end` or
@@ -245,12 +239,13 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
 fn is_linear(end: u64, words: &[u64]) -> u64 {
     words.iter().fold(end, |end, w| {
         assert!(w >> 7 >= end, "leaves must be in order and must not overlap");
-        (w >> 7) + volume_of(level_of(*w), 1)
+        (w >> 7) + volume_of(*w)
     })
 }
 
-fn level_of(word: u64) -> Level {
-    (word >> 2 & 31) as Level
+/// The volume of a leaf, in octants of level 19.
+fn volume_of(word: u64) -> u64 {
+    start57((word >> 2 & 31) as Level, 1)
 }
 
 #[cfg(test)]

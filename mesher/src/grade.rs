@@ -106,7 +106,7 @@ impl Gradation<'_> {
     /// Splits the parents of the split octants of level `l`, and those of the octants `touched`, of
     /// level `l - 1`, that are kept. Collective: another rank may own the parent of an octant.
     fn close(&mut self, l: Level, touched: BrickSet) {
-        let split = self.split[l as usize].bricks().filter(|b| self.ownership.owns(l, b.key));
+        let split = self.ownership.owned(l, &self.split[l as usize]);
         let parents: BrickSet = split.map(Brick::parents).collect();
         let fresh = parents.without(&self.split[l as usize - 1]);
         let ([fresh, touched], sent) =
@@ -130,8 +130,7 @@ impl Gradation<'_> {
             let parents = self.counted(reached);
             return if to < l - 1 { parents.coarsen() } else { parents };
         }
-        let groups = self.split[l as usize - 1].bricks();
-        let groups = groups.filter(|b| self.ownership.owns(l - 1, b.key));
+        let groups = self.ownership.owned(l - 1, &self.split[l as usize - 1]);
         let radius = radius.div_ceil(2);
         // What is reached is the greatest set of all: its parents are made without it.
         let reached = match to < l - 1 {
@@ -165,9 +164,8 @@ impl Gradation<'_> {
 
     /// Splits octants that are not split yet, in bricks that this rank holds.
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
-        let owned = fresh.bricks().filter(|b| self.ownership.owns(l, b.key));
-        let octants: u64 = owned.map(|b| u64::from(b.bits.count_ones())).sum();
-        self.counters.octants_split_graded += octants;
+        let owned = self.ownership.owned(l, &fresh).map(|b| u64::from(b.bits.count_ones()));
+        self.counters.octants_split_graded += owned.sum::<u64>();
         let before = std::mem::take(&mut self.split[l as usize]);
         self.split[l as usize] = before.union(fresh);
     }
@@ -176,8 +174,7 @@ impl Gradation<'_> {
     /// surface level, which is not 0, that touch a crossing leaf. Collective.
     fn extra_layer(&mut self, surface: Level) {
         for m in (surface..self.crossing.len() as Level).rev() {
-            let leaves = self.crossing[m as usize].bricks();
-            let leaves = leaves.filter(|b| self.ownership.owns(m, b.key));
+            let leaves = self.ownership.owned(m, &self.crossing[m as usize]);
             let reached = dilate_children(m - 1, leaves, 1);
             let touched = (surface..m).fold(self.counted(reached), |set, _| set.coarsen());
             self.split_where_kept(surface - 1, touched);

@@ -86,7 +86,7 @@ def order(k):
     yield z3.Implies(z3.And(a.x == b.x, z3.ULT(l.x, m.x)), z3.ULT(v.x, w.x))
 
 
-@fact(OCTANT, ("filter(|&v| v < 1 << l)", "filter(|&v| v <= 1 << l)"), ("p[axis].checked_sub(1)?", "p[axis].checked_sub(2)?"))
+@fact(OCTANT, ("filter(|&v| v < 1 << l)", "filter(|&v| v <= 1 << l)"), ("if up { 1 } else { -1 }", "if up { 1 } else { -2 }"))
 def neighbours(k):
     """`neighbour` moves one position along one axis, and is none exactly where that leaves the root, at every level."""
     for axis in AXES:

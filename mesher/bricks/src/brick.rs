@@ -7,6 +7,7 @@
 //!   octant of level `l - 1` with code `key << 3 | j`;
 //! - levels 0 and 1 have a single brick, with key 0, of which 1 and 8 bits are used.
 
+use crate::brickset::ones;
 use crate::octant::{self, Level};
 use crate::with_avx512;
 use bytemuck::{Pod, Zeroable};
@@ -26,6 +27,12 @@ impl Brick {
     #[inline]
     pub fn parents(self) -> Self {
         Self { key: self.key >> 3, bits: u64::from(parents(self.bits)) << (8 * (self.key & 7)) }
+    }
+
+    /// The codes of its octants in Morton order.
+    #[inline]
+    pub fn codes(self) -> impl Iterator<Item = u64> {
+        ones(self.bits).map(move |bit| self.key << 6 | u64::from(bit))
     }
 }
 

@@ -231,7 +231,7 @@ impl BrickSet {
 
     /// The codes of the set's octants in Morton order.
     pub fn codes(&self) -> impl Iterator<Item = u64> + '_ {
-        self.bricks().flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
+        self.bricks().flat_map(Brick::codes)
     }
 
     /// Checks the invariants.

@@ -51,11 +51,8 @@ fn digest_lanes(words: &[u64]) -> u128 {
             low = low.wrapping_add(b);
             top += b >> 32;
         }
-        let bottom = low.wrapping_sub(top << 32);
-        let sum = (u128::from(high) << 64)
-            .wrapping_add(u128::from(bottom))
-            .wrapping_add(u128::from(top) << 32);
-        total = total.wrapping_add(sum);
+        let low = u128::from(low.wrapping_sub(top << 32)) + (u128::from(top) << 32);
+        total = total.wrapping_add(low).wrapping_add(u128::from(high) << 64);
     }
     total
 }

@@ -88,11 +88,7 @@ pub fn corner(l: Level, code: u64) -> [i64; 3] {
 #[inline]
 pub fn neighbour(l: Level, code: u64, axis: usize, up: bool) -> Option<u64> {
     let mut p = position(code);
-    p[axis] = if up {
-        p[axis].checked_add(1).filter(|&v| v < 1 << l)?
-    } else {
-        p[axis].checked_sub(1)?
-    };
+    p[axis] = p[axis].checked_add_signed(if up { 1 } else { -1 }).filter(|&v| v < 1 << l)?;
     Some(morton(p))
 }
 

@@ -112,8 +112,7 @@ pub fn stop_at(point: fmt::Arguments) {
 /// Waits until the signals that were taken before are handled; they may end the process.
 fn wait_for_handler() {
     if let Some((sent, barrier)) = HANDLER.get() {
-        let mut sent = sent;
-        sent.write_all(&[WAITING]).expect("the thread reads until the process ends");
+        (&*sent).write_all(&[WAITING]).expect("the thread reads until the process ends");
         barrier.wait();
     }
 }

@@ -216,7 +216,6 @@ impl<'a> Problem<'a> {
         let tightest_at = |shift| ranks.tightest(&ranks.growth(&pilot.at(shift)));
         let fits = |t: Option<Tightest>| t.is_none_or(|t| t.needed_bytes <= t.left_bytes);
         let Amounts { cells, .. } = pilot.at(0);
-        let tightest = tightest_at(0);
         let fitting = (0..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
         let thin = f64::max(4.0 / f64::from(self.rules.layer_cells_min), 1.0);
         let [before, written] = self.times_s;
@@ -229,7 +228,7 @@ impl<'a> Problem<'a> {
             memory_peak_bytes: ranks.peaks(&ranks.growth(&pilot.at(0))),
             words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + WORDS_HEADER,
             tree_bytes: (cells * TREE_BYTES_PER_CELL * thin) as u64,
-            tightest,
+            tightest: tightest_at(0),
             fits: fitting == Some(0),
             spacing_factor_fits: fitting.filter(|s| *s > 0).map(|s| 2f64.powi(s as i32)),
         };

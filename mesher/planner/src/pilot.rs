@@ -7,7 +7,7 @@
 //! between 2 and 1 for the slower ones.
 
 use bricks::brick;
-use bricks::brickset::{BrickSet, ones};
+use bricks::brickset::BrickSet;
 use bricks::octant::{Level, corner, edge};
 use bytemuck::{Pod, Zeroable};
 use mesher::input::lattice::{ExtentBox, Rules};
@@ -186,11 +186,10 @@ pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
 fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
     let mut cells = 0.0;
     for (l, deleted) in (0..).zip(mesh.sides.deleted()) {
-        for b in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
+        for b in mesh.ownership.owned(l, deleted) {
             let near = near(boxes, brick::min_corner(l, b.key), 4 * edge(l));
             if !near.is_empty() {
-                let leaves = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
-                cells += leaves.map(|code| boxed_in(&near, l, code)).sum::<f64>();
+                cells += b.codes().map(|code| boxed_in(&near, l, code)).sum::<f64>();
             }
         }
     }

@@ -110,13 +110,8 @@ pub enum CommChoice {
     Solo,
     /// MPI.
     Mpi,
-    /// Ranks simulated in this process.
-    Sim {
-        /// Number of ranks.
-        ranks: usize,
-        /// Seed of their schedule.
-        seed: u64,
-    },
+    /// Ranks simulated in this process: their number, and the seed of their schedule.
+    Sim { ranks: usize, seed: u64 },
 }
 
 fn level_base(s: &str) -> Result<LevelBase, String> {
@@ -183,6 +178,7 @@ pub fn options(args: &Args) -> Result<Options, Error> {
         }
         (_, weights) => weights.unwrap_or_default(),
     };
+    let case_name = is_case_file(args).then(|| args.input().display().to_string());
     let has = |files| args.write.contains(&files);
     let (words, tree) = (has(Files::Words), has(Files::Htg));
     Ok(Options {
@@ -191,10 +187,7 @@ pub fn options(args: &Args) -> Result<Options, Error> {
         out: args.out.clone().map(|directory| Output { directory, words, tree }),
         check: args.check,
         strict: args.strict,
-        case_name: match is_case_file(args) {
-            true => args.input().display().to_string(),
-            false => "CASE".to_owned(),
-        },
+        case_name: case_name.unwrap_or_else(|| "CASE".to_owned()),
     })
 }
 
@@ -219,8 +212,7 @@ pub fn case(args: &Args, comm: &dyn Comm) -> Result<Case, Error> {
         let text = uncounted(comm, || agree(comm, text).map(of_first))?;
         return case_file::parse(&text, args.input());
     }
-    let case =
-        args.keys.clone().and_then(|keys| keys.case_of(Source::Stl(args.input().to_owned())));
+    let case = args.keys.clone().and_then(|k| k.case_of(Source::Stl(args.input().to_owned())));
     case.ok_or_else(|| {
         let why = "is read as an STL file: give --spacing-min, or a case file (.toml)";
         Error::input(format!("{input} {why}"))

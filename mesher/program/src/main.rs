@@ -62,9 +62,8 @@ fn main() {
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn fix_heap() {
     use libc::{M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
-    for (parameter, value) in
-        [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, 1)]
-    {
+    let fixed = [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, 1)];
+    for (parameter, value) in fixed {
         // SAFETY: `mallopt` only sets a number, under the lock of the heap; any size is valid.
         unsafe { libc::mallopt(parameter, value) };
     }

@@ -25,7 +25,7 @@ pub fn agree_over_faces(sides: &Sides, base: &Base) {
     });
     for (here, there) in [(stored, &others), (&others, stored)] {
         for l in 0..LEVELS as Level {
-            let owned = here[l as usize].bricks().filter(|b| ownership.owns(l, b.key));
+            let owned = ownership.owned(l, &here[l as usize]);
             let steps = |b: Brick| (0..3).flat_map(move |axis| beside(l, b, axis));
             let near = BrickSet::from_unsorted(owned.flat_map(steps).collect());
             let near = to_owners(near, l, ownership, comm);

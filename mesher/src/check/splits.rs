@@ -93,10 +93,8 @@ fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
     if (0..3).any(apart) {
         return false;
     }
-    let v: [Vector; 3] =
-        f.v.map(|p| std::array::from_fn(|a| i128::from(p[a]) - i128::from(min[a])));
-    let edges: [Vector; 3] =
-        [0, 1, 2].map(|i| std::array::from_fn(|a| v[(i + 1) % 3][a] - v[i][a]));
+    let v = f.v.map(|p| [0, 1, 2].map(|a| i128::from(p[a]) - i128::from(min[a])));
+    let edges = [0, 1, 2].map(|i| [0, 1, 2].map(|a| v[(i + 1) % 3][a] - v[i][a]));
     let meet = |axis: Vector| {
         let at = v.map(|p| dot(axis, p));
         let reach =
@@ -112,9 +110,7 @@ fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
 /// level at most, and no octant is split without need. Collective.
 pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
     let Mesh { rules, split, crossing, sides, ownership, .. } = mesh;
-    let owned = |l: Level, set: &BrickSet| -> BrickSet {
-        set.bricks().filter(|b| ownership.owns(l, b.key)).collect()
-    };
+    let owned = |l: Level, set: &BrickSet| -> BrickSet { ownership.owned(l, set).collect() };
     let gather = |l: Level, set: BrickSet| to_owners(set, l, ownership, comm);
     // The kept leaves among some octants of level l.
     let leaves = |l: Level, octants: BrickSet| {
@@ -150,8 +146,7 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
             require(is_deleted, l - 1, code, "must be split for a layer or balance");
         }
         let all = owned(l, &BrickSet::from_unsorted(Tree::exists(split, l).collect()));
-        touched =
-            if l > 1 { dilated(leaves(l, all), l, 1).coarsen().coarsen() } else { BrickSet::EMPTY };
+        touched = dilated(leaves(l, all), l, 1).coarsen().coarsen();
     }
 }
 

@@ -126,10 +126,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     let (mut facets, mut solids) = (Vec::new(), 0);
     while solids == 0 || !text.is_at_end() {
         solids += 1;
-        let solid = text.solid(&mut facets);
-        solid.map_err(|why| {
-            format!("is malformed at facet {}, in solid {solids} ({why})", facets.len())
-        })?;
+        let (solid, facet) = (text.solid(&mut facets), facets.len());
+        solid.map_err(|why| format!("is malformed at facet {facet}, in solid {solids} ({why})"))?;
     }
     Ok(facets)
 }
@@ -190,9 +188,7 @@ impl<'a> Text<'a> {
     fn facet(&mut self) -> Result<Facet, String> {
         self.expect("normal")?;
         // Normals are not used, and often are not numbers.
-        for _ in 0..3 {
-            self.word();
-        }
+        (0..3).for_each(|_| _ = self.word());
         self.expect("outer")?;
         self.expect("loop")?;
         let mut facet = Facet::default();

@@ -187,9 +187,7 @@ fn siblings(brick: Octants, exist: u64) -> Siblings {
     let groups = parents(exist);
     let packed = |bits: u64| match groups {
         0xff => bits,
-        _ => {
-            (0..).zip(ones(groups.into())).map(|(to, j)| (bits >> (8 * j) & 0xff) << (8 * to)).sum()
-        }
+        _ => (0..).zip(ones(groups.into())).map(|(k, j)| (bits >> (8 * j) & 0xff) << (8 * k)).sum(),
     };
     Siblings {
         split: packed(split & exist),

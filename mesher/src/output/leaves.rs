@@ -9,7 +9,7 @@ use crate::output::write::{OutDir, Output, Part, TREE, part_name};
 use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
 use bricks::digest::{Digests, hex};
-use bricks::octant::{LEVEL_MAX, Level};
+use bricks::octant::LEVEL_MAX;
 use files::interrupt::stop_at;
 use ranks::Comm;
 use serde::Serialize;
@@ -25,7 +25,8 @@ pub type Emitted = (Counts, Digests, u64);
 pub fn emit(mesh: &Mesh, out: Option<&OutDir>, comm: &dyn Comm) -> Result<Emitted, Error> {
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
-    let mut heaviest = Heaviest::new(level);
+    let shift = 3 * (LEVEL_MAX - level);
+    let mut heaviest = Heaviest { shift, ..Heaviest::default() };
     let name = part_name(comm.rank());
     let mut work = || {
         let begin = |out: &OutDir| Part::new(out.file(&name)?);
@@ -65,6 +66,7 @@ pub fn finish(
 
 /// The number of leaves in this rank's heaviest octant of a level, as they are streamed in Morton order. It bounds the load balance of
 /// any partition between such octants.
+#[derive(Default)]
 struct Heaviest {
     /// Bits of a leaf's code within an octant.
     shift: u32,
@@ -75,10 +77,6 @@ struct Heaviest {
 }
 
 impl Heaviest {
-    fn new(level: Level) -> Self {
-        Self { shift: 3 * (LEVEL_MAX - level), octant: 0, leaves: 0, max: 0 }
-    }
-
     /// Counts the next leaves. One that is larger than an octant counts for the first in it.
     fn add(&mut self, mut words: &[u64]) {
         while let Some(octant) = words.first().map(|w| w >> 7 >> self.shift) {
@@ -223,7 +221,8 @@ mod tests {
             [of(2, &[1, 3]), of(1, &[1]), of(3, &[128, 129, 130, 200]), of(2, &[32, 63])].concat();
         for (level, want) in [(1, 3), (0, 9), (2, 3)] {
             for piece in 1..=words.len() {
-                let mut heaviest = Heaviest::new(level);
+                let shift = 3 * (LEVEL_MAX - level);
+                let mut heaviest = Heaviest { shift, ..Heaviest::default() };
                 words.chunks(piece).for_each(|piece| heaviest.add(piece));
                 assert_eq!(heaviest.max, want, "level {level}, pieces of {piece}");
             }

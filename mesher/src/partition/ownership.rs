@@ -14,7 +14,7 @@ mod redistribute;
 
 use crate::partition::curve::{ALL, Boundary};
 use bricks::brick::Brick;
-use bricks::brickset::ones;
+use bricks::brickset::{BrickSet, ones};
 use bricks::octant::{LEVEL_MAX, Level, corner, edge, start57};
 use bricks::tree::{PerLevel, Tree};
 use std::ops::Range;
@@ -226,6 +226,12 @@ impl Ownership {
             || l > self.level_replicated + 1
             || self.own.contains(&brick_start(l, key))
             || Some(self.owner(l, key)) == self.rank
+    }
+
+    /// The bricks that this rank owns, of those of level `l` that it holds.
+    #[inline]
+    pub fn owned(&self, l: Level, set: &BrickSet) -> impl Iterator<Item = Brick> {
+        set.bricks().filter(move |b| self.owns(l, b.key))
     }
 
     /// Whether several ranks hold a brick of level `l`.

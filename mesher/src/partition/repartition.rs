@@ -77,10 +77,7 @@ pub fn migrate(sets: [&mut PerLevel; 3], from: &Ownership, to: &Ownership, comm:
     for (l, mut octants) in (0..).zip(full).filter(|(_, octants)| !octants.is_empty()) {
         // Other octants of these fill bricks that this rank does not hold.
         let is_held = |key| !matches!(to.placement(l + 2, key), Placement::Remote(_));
-        octants.retain(|b| {
-            let keys = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
-            keys.filter(|key| is_held(*key)).map(|key| 1 << (key & 63)).sum()
-        });
+        octants.retain(|b| b.codes().filter(|key| is_held(*key)).map(|key| 1 << (key & 63)).sum());
         // Ranks that had not condensed their part of the level have sent full bricks as such, perhaps the same ones.
         split[l as usize + 2].replace_full(octants);
         split[l as usize + 2].condense();
@@ -102,8 +99,8 @@ impl<'a> Loads<'a> {
     /// Adds the estimated work on a level, from every `stride`-th group of bricks.
     fn estimate(&mut self, tree: &Tree, l: Level, stride: usize) {
         let above = &tree.split[l as usize - 1];
-        let (mut split, mut crossing) =
-            (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
+        let [mut split, mut crossing] =
+            [&tree.split, &tree.crossing].map(|s| s[l as usize].cursor());
         for (n, b) in (0..above.len()).step_by(stride).map(|i| above.brick(i)).enumerate() {
             // Every other brick of a group, as the bricks of a group are alike; alternately from the first and from the second.
             let groups = ones(u64::from(brick::parents(b.bits))).map(u64::from);

@@ -233,9 +233,8 @@ impl Walk<'_> {
                     if let Across::Remote = self.across(frame, family, j, (axis, up)) {
                         let beside = neighbour(l - 2, key, axis, up == 1);
                         let beside = beside.expect("the neighbour lies in the root");
-                        self.record_face((l, beside), part, |bits| {
-                            brick::across(bits, axis, up == 1)
-                        });
+                        let faced = |bits| brick::across(bits, axis, up == 1);
+                        self.record_face((l, beside), part, faced);
                     }
                 }
             }

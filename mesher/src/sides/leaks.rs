@@ -17,7 +17,7 @@ use super::verdict::{self, Candidate};
 use super::{Base, Components};
 use crate::input::lattice::{Keep, Rules};
 use bricks::brick::Brick;
-use bricks::octant::{LEVEL_MAX, Level};
+use bricks::octant::{LEVEL_MAX, Level, start57};
 use bricks::tree::{LEVELS, PerLevel, Tree};
 use ranks::{all_gather_reduced, uncounted};
 use serde::Serialize;
@@ -77,11 +77,8 @@ impl Region {
             Keep::Inside => &[true],
             Keep::Outside | Keep::All => &[false],
         };
-        let region = |&is_inside: &bool| Self {
-            is_inside,
-            cut: rules.level_surface - 1,
-            walls: PerLevel::default(),
-        };
+        let cut = rules.level_surface.saturating_sub(1);
+        let region = |&is_inside: &bool| Self { is_inside, cut, walls: PerLevel::default() };
         sides.iter().map(region).collect()
     }
 
@@ -137,8 +134,7 @@ pub fn find(base: &Base, regions: Vec<Region>, may_be_skipped: bool) -> Leaks {
 /// Number of crossing leaves of the surface level. Collective; the same on all ranks.
 fn crossing_leaves(base: &Base) -> u64 {
     let level = base.rules.level_surface;
-    let crossing = base.tree.crossing[level as usize].bricks();
-    let owned = crossing.filter(|b| base.ownership.owns(level, b.key));
+    let owned = base.ownership.owned(level, &base.tree.crossing[level as usize]);
     base.comm.sum(owned.map(|b| u64::from(b.bits.count_ones())).sum())
 }
 
@@ -153,8 +149,7 @@ fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     } else {
         verdict::by_seeds(&components.all, seeded.clone(), base.rules.keep)
     };
-    let has_leaked =
-        |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
+    let has_leaked = |c: &Label| verdict.inside.contains(c) != is_inside && !seeded.contains(c);
     let leaked: Vec<_> = components.all.iter().filter(|(label, _)| has_leaked(label)).collect();
     if leaked.is_empty() {
         return Vec::new();
@@ -184,8 +179,8 @@ impl Components {
             let bricks = self.nodes.bricks(base.tree, l);
             for (_, part) in bricks.filter(|b| base.ownership.owns(l, b.0.key)) {
                 self.nodes.masks.brick(part, |c, bits| {
-                    mine[self.merged[c as usize] as usize] +=
-                        u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));
+                    let volume = start57(l, bits.count_ones().into());
+                    mine[self.merged[c as usize] as usize] += volume;
                 });
             }
         }
@@ -203,7 +198,7 @@ impl Leaks {
         let order = |leak: &Leak| (u32::MAX - leak.level, leak.first);
         let are_sorted = self.0.is_sorted_by(|a, b| order(a) < order(b));
         assert!(are_sorted, "leaks must be in order: {self:?}");
-        let volume = |l: Level| 1u64 << (3 * (LEVEL_MAX - l));
+        let volume = |l: Level| start57(l, 1);
         for leak in &self.0 {
             let (level, (first, code)) = (rules.level_surface, leak.first.leaf());
             assert!(

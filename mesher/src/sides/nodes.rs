@@ -116,8 +116,7 @@ pub fn open_bricks(
     ownership: &Ownership,
     l: Level,
 ) -> impl Iterator<Item = OpenBrick> {
-    let mut split = tree.split[l as usize].cursor();
-    let mut crossing = tree.crossing[l as usize].cursor();
+    let [mut split, mut crossing] = [&tree.split, &tree.crossing].map(|s| s[l as usize].cursor());
     Tree::exists(&tree.split, l).map(move |Brick { key, bits }| {
         let is_local = !ownership.is_replicated(l) && ownership.owns(l, key);
         let placement = if is_local { Placement::Local } else { ownership.placement(l, key) };
@@ -316,8 +315,7 @@ impl Nodes {
 
     /// Bytes that the nodes and their components take.
     pub fn bytes(&self) -> usize {
-        let of_level =
-            |level: &LevelNodes| size_of_val(&level.split[..]) + size_of_val(&level.blocks[..]);
+        let of_level = |l: &LevelNodes| size_of_val(&l.split[..]) + size_of_val(&l.blocks[..]);
         self.levels.iter().map(of_level).sum::<usize>() + self.masks.bytes()
     }
 

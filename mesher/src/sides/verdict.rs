@@ -17,7 +17,6 @@ use super::{Ambiguous, Base, Components, EnclosedComponents, Verdict};
 use crate::error::Error;
 use crate::input::lattice::{Enclosed, Keep};
 use bricks::brick::Brick;
-use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton};
 use bricks::tree::LEVELS;
 use bytemuck::allocation::pod_collect_to_vec;
@@ -68,8 +67,7 @@ pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) 
                 let is_of_brick = |last: &Candidate| *last >= Candidate::new(l, key << 6);
                 let before = list.len();
                 if before < CANDIDATES || list.last().is_some_and(is_of_brick) {
-                    let leaf = |bit| Candidate::new(l, key << 6 | u64::from(bit));
-                    list.extend(ones(bits).map(leaf));
+                    list.extend(Brick { key, bits }.codes().map(|code| Candidate::new(l, code)));
                     unfinished -= usize::from(before < CANDIDATES && list.len() >= CANDIDATES);
                 }
             });
@@ -107,8 +105,7 @@ fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLe
 /// facets; `mine` are this rank's [`candidates`]. Collective; the result is the same on all ranks.
 pub fn by_vote(components: &[FirstLeaf], mine: &FirstLeaves, base: &Base) -> Verdict {
     let mut verdict = Verdict::default();
-    let mut lists: FirstLeaves =
-        components.iter().map(|&(label, first)| (label, vec![first])).collect();
+    let mut lists: FirstLeaves = components.iter().map(|&(label, c)| (label, vec![c])).collect();
     // The components that are not decided yet, with the number of their rays so far that met an odd number of facets; and those that
     // have no more leaves to try.
     let mut open: Vec<(Label, usize)> = components.iter().map(|c| (c.0, 0)).collect();
@@ -147,9 +144,8 @@ pub fn by_vote(components: &[FirstLeaf], mine: &FirstLeaves, base: &Base) -> Ver
 /// The candidates of some components, from all ranks. Collective; the result is the same on all ranks.
 fn gather_candidates(mine: &FirstLeaves, open: &[(Label, usize)], comm: &dyn Comm) -> FirstLeaves {
     let lists = open.iter().filter_map(|(label, _)| Some((*label, mine.get(label)?)));
-    let pairs: Vec<[u64; 2]> =
-        lists.flat_map(|(label, list)| list.iter().map(move |c| [label, c.0])).collect();
-    let all = gather(comm, &pairs).into_iter();
+    let pairs = lists.flat_map(|(label, list)| list.iter().map(move |c| [label, c.0]));
+    let all = gather(comm, &pairs.collect::<Vec<_>>()).into_iter();
     first_of_all(all.map(|[label, candidate]| (label, vec![Candidate(candidate)])))
 }
 
@@ -206,19 +202,16 @@ pub fn flow_of_seeds(found: &HashMap<u64, Label>, base: &Base) -> Result<HashSet
 /// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance
 /// and its [`Candidate`]. Of leaves at the same distance the first, by level and Morton code.
 fn nearest(base: &Base, point: [i64; 3]) -> Option<[u64; 2]> {
-    let mut best = None;
-    for l in 0..LEVELS as Level {
-        for b in open_bricks(base.tree, base.ownership, l) {
-            for bit in ones(b.open) {
-                let leaf = Candidate::new(l, b.key << 6 | u64::from(bit));
-                let centroid = leaf.centroid();
-                let squared = |a: usize| (centroid[a] - point[a]).pow(2) as u64;
-                let found = [(0..3).map(squared).sum(), leaf.0];
-                best = Some(best.map_or(found, |best: [u64; 2]| best.min(found)));
-            }
-        }
-    }
-    best
+    let leaves = |l: Level| {
+        let open = open_bricks(base.tree, base.ownership, l);
+        let codes = open.flat_map(|b| Brick { key: b.key, bits: b.open }.codes());
+        codes.map(move |code| Candidate::new(l, code))
+    };
+    let found = |leaf: Candidate| {
+        let centroid = leaf.centroid();
+        [(0..3).map(|a| (centroid[a] - point[a]).pow(2) as u64).sum(), leaf.0]
+    };
+    (0..LEVELS as Level).flat_map(leaves).map(found).min()
 }
 
 /// The sides of all components: the flow is on the side that is kept, outside if everything is.
