@@ -119,16 +119,32 @@ def degenerate(k):
                 *[back[of].x == -side[of].x for of in ("ci", "cj", "at_origin") for back in (other, last)]))
 
 
-@fact(FACET, ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 3 * i128::from(up - down) {"), ("let ceil = (offset + ((1 << shift) - 1)) >> shift;", "let ceil = offset >> shift;"),
-      ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 16 * i128::from(up - down) {"), ("<= (most - least) as u64", "<= most as u64"))
+def slab_of(n, most, span):
+    """The octants (i, j, k) where `n.(i, j, k) + most` lies in 0..=span."""
+    return word(z3.And(0 <= at, at <= span.x) for at in (sum((p[a] * n[a].x for a in AXES), most.x) for p in OCTANTS))
+
+
+@fact(FACET, ("let base = most.wrapping_add(2 * low[byte]);", "let base = most.wrapping_add(low[byte]);"), ("<< (8 * byte + i)", "<< (8 * i + byte)"), ("(i >> a & 1)", "(i >> (2 - a) & 1)"))
+def slabs(k):
+    """`slab` has an octant if and only if `n.(i, j, k) + most` is at least 0 and at most `span`, for all normals, and all `most` and `span` with which
+    no lane overflows."""
+    n = [k.integer("i64", -18 << 54, 18 << 54) for _ in AXES]
+    most, span = k.integer("i64", -5 << 60, 5 << 60), k.integer("u64", 0, 1 << 63)
+    yield k("slab", n, most, span, file=FACET).x == slab_of(n, most, span)
+
+
+@fact(FACET, ("floor.abs() <= 4 * i128::from(up - down)", "floor.abs() <= 3 * i128::from(up - down)"), ("let ceil = (offset + ((1 << shift) - 1)) >> shift;", "let ceil = offset >> shift;"),
+      ("floor.abs() <= 4 * i128::from(up - down)", "floor.abs() <= 16 * i128::from(up - down)"), ("most.wrapping_sub(least) as u64", "most as u64"), ("u64::from(is_near).wrapping_neg()", "u64::MAX"))
 def planes(k):
     """`plane_mask`: an octant meets the facet's plane if and only if its corners are not all on one side, for all normals, vertices and levels up
-    to 20. What is decided without lanes is decided so, and all lanes fit i64."""
+    to 20. What is decided without lanes is decided so, and where they decide, `most` and `span` are within the bounds of `slabs`."""
+    def slab(run, n, most, span):
+        return Number("u64", z3.If(z3.And(-5 << 60 <= most.x, most.x <= 5 << 60, span.x <= 1 << 63), slab_of(n, most, span), z3.FreshConst(z3.BitVecSort(64))))
     for shift in SHIFTS:
         h = 1 << shift
         n = [k.integer("i64", -18 << 54, 18 << 54) for _ in AXES]
         vertex = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
-        mask = k("plane_mask", vertex, n, u32(shift), file=FACET)
+        mask = k("plane_mask", vertex, n, u32(shift), file=FACET, replaced={"slab": slab})
         offset = sum(n[a].x * vertex[a].x for a in AXES)
         most, least = [sum(h * each([n[a].x, z3.IntVal(0)]) for a in AXES) for each in (maximum, minimum)]
         def meets(p): at = sum(h * p[a] * n[a].x for a in AXES) - offset; return z3.And(at + most >= 0, at + least <= 0)
@@ -253,7 +269,7 @@ def candidates(k):
 # The digest
 
 
-@fact(DIGEST, ("low += b & 0xffff_ffff;", "low += b & 0xffff_fffe;"), ("u128::from(low_top) << 32", "u128::from(low_top) << 31"), ("words.chunks(1 << 30)", "words.chunks(1 << 33)"))
+@fact(DIGEST, ("low = low.wrapping_add(b);", "low = low.wrapping_add(b | 1);"), ("u128::from(top) << 32", "u128::from(top) << 31"), ("words.chunks(1 << 30)", "words.chunks(1 << 33)"))
 def digests(k):
     """`digest_lanes` of up to three words is the sum of their `mix`, whatever the words; sums of 2^30 parts of 32 bits, as many as it takes at
     a time, fit u64."""
