@@ -99,8 +99,8 @@ impl<'a> Loads<'a> {
     /// Adds the estimated work on a level, from every `stride`-th group of bricks.
     fn estimate(&mut self, tree: &Tree, l: Level, stride: usize) {
         let above = &tree.split[l as usize - 1];
-        let [mut split, mut crossing] =
-            [&tree.split, &tree.crossing].map(|s| s[l as usize].cursor());
+        let (mut split, mut crossing) =
+            (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
         for (n, b) in (0..above.len()).step_by(stride).map(|i| above.brick(i)).enumerate() {
             // Every other brick of a group, as the bricks of a group are alike; alternately from the first and from the second.
             let groups = ones(u64::from(brick::parents(b.bits))).map(u64::from);

@@ -247,7 +247,7 @@ impl Sides {
                     masks.free_before(part);
                 }
                 let [outside, within, enclosed] =
-                    [0, 1, 2].map(|of| of_block[of][key as usize & 7]);
+                    of_block.each_ref().map(|of| of[key as usize & 7]);
                 let open = outside | within | enclosed;
                 let stored = match self.keep {
                     Keep::All => within,
