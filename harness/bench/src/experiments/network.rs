@@ -2,7 +2,9 @@
 
 use super::entry::{ASSUMED, Network};
 use super::execute::Runner;
+use super::machine::cores;
 use contract::number::number;
+use run::engine::layout::node_count;
 use run::engine::process::{self, Watch};
 use serde_json::Value;
 use std::fmt;
@@ -29,8 +31,11 @@ impl fmt::Display for Network {
 /// median latency counts.
 ///
 /// # Errors
-/// One sentence, if the ping-pong is missing or fails.
+/// One sentence, if both ranks would share a core, or the ping-pong is missing or fails.
 pub fn measured(runner: &Runner) -> Result<Network, String> {
+    if cores() * node_count() < 2 {
+        return Err("the two ranks of a ping-pong would share one core".to_owned());
+    }
     let program = runner.programs.mesher.program.with_file_name("pingpong");
     if !program.is_file() {
         let program = program.display();
@@ -48,21 +53,25 @@ pub fn measured(runner: &Runner) -> Result<Network, String> {
     Ok(three[1])
 }
 
-/// Parses the output of `pingpong`, one-way times of messages of ascending sizes: latency from the first, bandwidth from the last.
+/// Parses the output of `pingpong`, one-way times of messages of ascending sizes: latency from the first, bandwidth from the last. The
+/// longest message takes far longer than an empty one, and the others nearly what latency and bandwidth give, on any network.
 fn parse(text: &str) -> Result<Network, String> {
     let printed: Value = serde_json::from_str(text)
         .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
     let point = |of: &Value| Some([of["bytes"].as_f64()?, of["time_s"].as_f64()?]);
     let points = printed["points"].as_array().into_iter().flatten().filter_map(point);
-    match points.collect::<Vec<_>>()[..] {
-        [[small, latency_s], .., [large, time_s]]
-            if latency_s > 0.0 && large > small && time_s > latency_s =>
-        {
-            let bandwidth_bytes_per_s = (large - small) / (time_s - latency_s);
-            Ok(Network { latency_s, bandwidth_bytes_per_s, measured: true })
+    let points: Vec<[f64; 2]> = points.collect();
+    if let [[small, latency_s], .., [large, time_s]] = points[..] {
+        let bandwidth_bytes_per_s = (large - small) / (time_s - latency_s);
+        let network = Network { latency_s, bandwidth_bytes_per_s, measured: true };
+        let is_near =
+            |[bytes, s]: &[f64; 2]| (0.25..4.0).contains(&(s / network.time_s(1.0, *bytes)));
+        let grow = points.is_sorted_by(|a, b| a[0] < b[0] && 0.7 * a[1] < b[1]);
+        if grow && latency_s > 0.0 && time_s > 10.0 * latency_s && points.iter().all(is_near) {
+            return Ok(network);
         }
-        _ => Err("the ping-pong's times do not grow with the messages".to_owned()),
     }
+    Err("the ping-pong's times do not grow with the messages".to_owned())
 }
 
 /// Parses `LATENCY_SECONDS,BYTES_PER_SECOND`.
@@ -81,6 +90,7 @@ pub fn given(text: &str) -> Result<Network, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn ping_pong_output_is_parsed() {
@@ -90,6 +100,17 @@ mod tests {
         assert!((n.bandwidth_bytes_per_s / 1e10 - 1.0).abs() < 1e-9);
         assert!(parse("{}").is_err());
         assert!(parse(&text.replace("1.01e-4", "1e-7")).unwrap_err().contains("grow"));
+        let of = |times_s: [f64; 6]| {
+            let bytes = [0, 8, 1024, 1 << 16, 1 << 20, 1 << 23].into_iter();
+            let points = bytes.zip(times_s).map(|(b, s)| json!({"bytes": b, "time_s": s}));
+            parse(&json!({ "points": points.collect::<Vec<_>>() }).to_string())
+        };
+        let quiet = [4.3e-7, 4.0e-7, 7.4e-7, 3.6e-5, 4.0e-4, 4.0e-3];
+        assert!((of(quiet).unwrap().bandwidth_bytes_per_s / 2.1e9 - 1.0).abs() < 0.01);
+        // Two ranks on one core, in turns of the scheduler; a disturbed point; times that fall.
+        assert!(of([3.999e-3, 4e-3, 4e-3, 4e-3, 4e-3, 4.004e-3]).is_err());
+        assert!(of([4.3e-7, 4.0e-7, 7.4e-7, 4e-3, 4e-3, 4e-3]).is_err());
+        assert!(of([4.3e-7, 1.6e-6, 7.4e-7, 3.6e-5, 4.0e-4, 4.0e-3]).is_err());
     }
 
     #[test]
