@@ -32,6 +32,9 @@ pub struct Expected {
     pub seconds_once: f64,
     /// The values, run by run.
     pub values: Vec<Value>,
+    /// The runs that failed or were left out, and so are not repeated, a sentence each.
+    #[serde(skip)]
+    pub missing: Vec<String>,
     /// The runs.
     #[serde(skip)]
     setups: Vec<Setup>,
@@ -92,7 +95,8 @@ impl Expected {
         let setups = groups.all.iter().map(|group| group.setup.clone()).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
-        let expected = Self { schema, commit, seconds, seconds_once, values, setups };
+        let missing = groups.missing;
+        let expected = Self { schema, commit, seconds, seconds_once, values, missing, setups };
         expected.check_invariants();
         Ok(expected)
     }
@@ -112,6 +116,11 @@ impl Expected {
             ))),
             repeats => Ok(Some(repeats)),
         }
+    }
+
+    /// The number of values that are compared: all but times.
+    pub fn compared(&self) -> usize {
+        self.values.iter().filter(|value| !matches!(value.found, Found::Time(_))).count()
     }
 
     /// Executes the invariants at the head of this file.

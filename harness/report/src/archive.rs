@@ -99,17 +99,19 @@ pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
     let machines = machines(lines);
     let measured = machines.iter().map(|machine| format!("Measured on {machine}.\n"));
     let commits = machines.iter().map(|machine| machine.commit.trim_end_matches("-dirty"));
+    let missing = expected.missing.iter().map(|why| format!("\nMissing of the study: {why}\n"));
     format!(
         "# {title}\n\n{author}, {day}, licence {licence}.\n\n{}\nTo repeat it, in a clone of the programs' repository at commit {}:\n\n```\nharness replay THIS_DIRECTORY\n```\n\n\
          It prints expected values beside measured ones: digests, cells and counters must be equal; ratios (speedup, efficiency, load \
          imbalance, bytes per cell) lie within the interval of their repetitions and {:.0} % beyond it; times are those of a machine, and \
          are not compared. All runs took {}, and one run of each {}.\n\n\
-         `study/` has the study with its cases, geometries and engines, `record.jsonl` every run, `expected.json` the values and bands.\n",
+         `study/` has the study with its cases, geometries and engines, `record.jsonl` every run, `expected.json` the values and bands.\n{}",
         measured.collect::<String>(),
         distinct(commits).join(" or "),
         TOLERANCE * 100.0,
         duration(expected.seconds),
-        duration(expected.seconds_once)
+        duration(expected.seconds_once),
+        missing.collect::<String>()
     )
 }
 

@@ -156,6 +156,8 @@ pub struct Groups {
     /// A sentence for every program and case of which there are several series, for nodes whose runs are pooled, for every run with
     /// another mesh, and for every program without any run on a case.
     pub notes: Vec<String>,
+    /// Those of them about runs that are missing.
+    pub missing: Vec<String>,
 }
 
 impl Groups {
@@ -209,8 +211,9 @@ impl Groups {
             },
         ));
         let origins = origins.each_ref().map(Origins::described).concat();
-        let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(distinct(notes)).collect();
-        let groups = Self { all, left_out, lacks, notes };
+        let missing = distinct(notes);
+        let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(missing.clone()).collect();
+        let groups = Self { all, left_out, lacks, notes, missing };
         groups.check_invariants();
         groups
     }

@@ -35,7 +35,7 @@ pub struct Arguments {
     about: About,
 }
 
-/// Makes the archive; returns the exit code.
+/// Makes the archive, and prints which runs of the study it lacks; returns the exit code.
 ///
 /// # Errors
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
@@ -88,9 +88,12 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     }
     put(METADATA, pretty(&metadata(about, &members, &lines)))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
-    let (values, files) = (expected.values.len(), members.len() + 1);
+    let is_compared = |value: &&Value| !matches!(value.found, Found::Time(_));
+    let values = expected.values.iter().filter(is_compared).count();
+    let files = members.len() + 1;
     println!("{}: {files} files, {values} values to be met by a replay", out.display());
-    Ok(EXIT_HOLDS)
+    expected.missing.iter().for_each(|why| println!("{why}"));
+    Ok(if expected.missing.is_empty() { EXIT_HOLDS } else { EXIT_MISSING })
 }
 
 /// The paths of the files in a directory and those in it. A link to a directory, which may lead in a circle, counts as a file.
@@ -132,6 +135,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     let expected = Expected::of(&lines)?;
     let path = archive.join(EXPECTED);
     let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+    expected.missing.iter().for_each(|why| eprintln!("harness: the archive lacks runs: {why}"));
     if text != pretty(&expected) {
         let why = "does not follow from the record: it was changed, or is of another version of the harness. The record's values are compared";
         eprintln!("harness: {} {why}", path.display());

@@ -115,6 +115,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     assert!(inside.code == 2 && inside.printed.contains("is in the report"), "{}", inside.printed);
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
+    assert!(made.printed.contains(" 3 values to be met"), "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
     // Another case than that of the runs.
     let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
@@ -147,6 +148,19 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
         "{}",
         other.printed
     );
+    // A run that failed, which the study asks for.
+    let line = record.lines().rfind(|line| line.contains("\"kind\":\"run\"")).unwrap();
+    let mut failed: serde_json::Value = serde_json::from_str(line).unwrap();
+    (failed["kind"], failed["why"]) = ("failure".into(), "no memory".into());
+    failed["setup"]["comm"] = "sim".into();
+    fixture
+        .write("series.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [1]\n");
+    fixture.write("series/record.jsonl", &format!("{record}{failed}\n"));
+    let lacking =
+        fixture.harness("archive series series.toml -o b --title T --author A --licence MIT");
+    let why = "sim:1 default: mesher failed: no memory";
+    assert!(lacking.code == 3 && lacking.printed.contains(why), "{}", lacking.printed);
+    assert!(fs::read_to_string(fixture.path("b/README.md")).unwrap().contains(why));
     // What was measured with is not needed any more.
     for name in ["case.toml", "body.stl", "mine.toml"] {
         fs::remove_file(fixture.path(name)).unwrap();
