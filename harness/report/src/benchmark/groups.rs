@@ -11,6 +11,9 @@ use std::fmt;
 /// The engine whose name is not in names of files.
 pub const OWN: &str = "mesher";
 
+/// What projected times are, as a sentence after others.
+pub const PROJECTED: &str = " Projected times are critical paths of medians per rank, which can be below every run; their intervals are of the projections of runs.";
+
 /// How the times of a group were obtained.
 pub fn provenance(group: &Group) -> Provenance {
     match group.setup.comm {
@@ -27,16 +30,14 @@ pub fn point(x: f64, m: Median) -> Point {
 
 /// The number of repetitions and the meaning of the error bars, as a sentence.
 pub fn repetitions(groups: &[&Group], value: impl Fn(&Group) -> Median) -> String {
-    let runs = format!("Medians of {} runs", range(groups, |g| g.time_s.count as u64));
+    let runs = range(groups, |g| g.time_s.count as u64);
     let covered = groups.iter().map(|g| value(g).per_cent()).filter(|covered| *covered > 0.0);
-    let Some(least) = covered.reduce(f64::min) else { return runs + "." };
-    let projected = match groups.iter().any(|g| g.setup.comm == Comm::Sim) {
-        true => "; those of projections are of the projections of single runs",
-        false => "",
-    };
-    format!(
-        "{runs}; bars are nonparametric confidence intervals of the median with at least {least} % coverage{projected}."
-    )
+    let bars = covered.reduce(f64::min).map_or(String::new(), |least| {
+        format!("; bars are nonparametric confidence intervals of the median with at least {least} % coverage")
+    });
+    let is_projected = groups.iter().any(|group| group.setup.comm == Comm::Sim);
+    let projected = if is_projected { PROJECTED } else { "" };
+    format!("Medians of {runs} runs{bars}.{projected}")
 }
 
 /// The origin of the times of single ranks, as a sentence.

@@ -72,7 +72,8 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
 }
 
 const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \result[interval]{KEY} its interval, \result[coverage]{KEY} the
-% confidence of that in per cent (95 and more need six repetitions), \result[unit]{KEY} its unit.
+% confidence of that in per cent (95 and more need six repetitions), \result[unit]{KEY} its unit. A projected time, and what
+% follows from it, is the critical path of medians per rank, and can be below that of every repetition.
 \newcommand{\result}[2][value]{\ifcsname result/#2/#1\endcsname\csname result/#2/#1\endcsname
   \else\PackageError{numbers}{the record has no result #2}{}\fi}
 \newcommand{\defresult}[5]{\expandafter\def\csname result/#1/value\endcsname{#2}%

@@ -1,6 +1,7 @@
 //! The page of a benchmark report, and which of the twelve rules of Hoefler and Belli, "Scientific Benchmarking of Parallel Computing
 //! Systems" (SC15), a record breaks. reports/README.md lists the rules, and how every report keeps those that no record can break.
 
+use super::groups::PROJECTED;
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure, page as whole_page};
@@ -32,7 +33,7 @@ pub fn page(groups: &Groups, drawn: &[Drawn], broken: &[Broken], lines: &[Line])
         }
         @for (f, svg) in drawn { (figure(f, svg)) }
         h2 id="tables" { "Tables" }
-        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." }
+        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." (PROJECTED) }
         @for table in tables::tables(groups) { (table.html()) }
         h2 id="causes" { "Causes of lost efficiency" }
         ul { @for cause in tables::causes(groups) { li { (cause) } } }

@@ -64,7 +64,9 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("partition", &|(g, _)| g.setup.division()),
             ("ranks", &|(g, _)| g.setup.ranks.to_string()),
             ("how", &|(g, _)| g.how().to_owned()),
-            ("median\ntime / s", &|(g, _)| digits(g.time_s.value)),
+            ("median\ntime / s,\nor projected\nfrom medians\nper rank", &|(g, _)| {
+                digits(g.time_s.value)
+            }),
             ("interval", &|(g, _)| [g.time_s.low, g.time_s.high].map(digits).join(" – ")),
             ("coverage", &|(g, _)| format!("{} %", g.time_s.per_cent())),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
@@ -176,9 +178,16 @@ mod tests {
             line(Entry::Run(Box::new(run(Comm::Mpi, 1_000_000, &[("grade", &[2.5, 1.0])])))),
         ];
         let text = text(&Groups::of(&lines));
-        for part in
-            ["1,000,000", "1.500", "3.00 – 3.00", "0 %", "67 % at 2 ranks", "+20.0 %", "projected"]
-        {
+        for part in [
+            "from medians",
+            "1,000,000",
+            "1.500",
+            "3.00 – 3.00",
+            "0 %",
+            "67 % at 2 ranks",
+            "+20.0 %",
+            "projected",
+        ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
     }
