@@ -51,6 +51,10 @@ impl Group {
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
             typical.time_wall_s = time_s.value;
+            if typical.phases.is_empty() {
+                // Then the useful time of every rank is the wall time.
+                typical.useful_s = Spread::exact(&vec![time_s.value; setup.ranks]);
+            }
         } else if by_rank {
             time_s.value = pop::time_s(&typical, &network);
             time_s.low = time_s.low.min(time_s.value);
@@ -91,8 +95,10 @@ impl Group {
 
     /// Returns the CPU time of the whole process, in seconds; `None` if it is unknown in a run.
     pub fn cpu_s(&self) -> Option<Median> {
-        // A launcher such as srun has its own, as ranks are not its children.
-        self.median_of(|run| Some(run.time_cpu_s).filter(|time| *time > 0.9 * run.useful_s.sum))
+        // A launcher such as srun has its own, as ranks are not its children. Without phases, useful time is wall time.
+        let is_wall = self.setup.comm == Comm::Solo && self.typical.phases.is_empty();
+        let is_of_ranks = |run: &Run| is_wall || run.time_cpu_s > 0.9 * run.useful_s.sum;
+        self.median_of(|run| is_of_ranks(run).then_some(run.time_cpu_s))
     }
 
     /// Returns the CPU time of the geometry search, in seconds; `None` if the program does not report it.
@@ -149,8 +155,6 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
-    /// Runs that failed or were left out.
-    pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
     pub lacks: Lacks,
     /// A sentence for every program and case of which there are several series, for nodes whose runs are pooled, for every run with
@@ -213,7 +217,7 @@ impl Groups {
         let origins = origins.each_ref().map(Origins::described).concat();
         let missing = distinct(notes);
         let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(missing.clone()).collect();
-        let groups = Self { all, left_out, lacks, notes, missing };
+        let groups = Self { all, lacks, notes, missing };
         groups.check_invariants();
         groups
     }
@@ -313,34 +317,22 @@ impl Groups {
 
     /// Returns the comparisons of programs, in the order of the record.
     pub fn comparisons(&self) -> Vec<Comparison<'_>> {
-        let is_compared = |g: &&Group| {
-            let by_size = ["strong", "spacing"].contains(&g.setup.experiment.as_str());
-            by_size && is_on_one_core(&g.setup) && g.cpu_s().is_some()
-        };
+        let by_size = |g: &&Group| ["strong", "spacing"].contains(&g.setup.experiment.as_str());
+        let is_serial = |g: &&Group| g.setup.ranks == 1 && g.setup.comm != Comm::Sim;
         let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
-        let by_case = by_key(self.all.iter().filter(is_compared), of_case);
+        let by_case = by_key(self.all.iter().filter(by_size).filter(is_serial), of_case);
         by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
     }
 
     /// Returns the comparison of the programs that have these groups, if there are several.
     fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
-        let (case, n) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
         let mut programs = by_key(groups, |g| g.setup.engine.as_str());
         programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
-        let left_out = self.left_out.iter().filter(|left| {
-            let s = &left.setup;
-            (&s.case, s.layer_cells_min) == (case, n) && is_on_one_core(s)
-        });
-        let left_out = left_out.map(|left| {
-            let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
-            let what = if is_repeated { "A run is missing" } else { "No mesh" };
-            format!("{what} at spacing {:.2e}: {}", left.setup.spacing_min, left.why)
-        });
         let lacks = programs.iter().filter_map(|(name, _)| {
             let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
             Some(format!("{name} does not provide: {}", lacks.join(", ")))
         });
-        let notes = left_out.chain(lacks).collect();
+        let notes = lacks.collect();
         let is_compared = programs.len() > 1;
         let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
         is_compared.then_some(Comparison { groups, notes })
@@ -416,12 +408,8 @@ fn apart(
 pub struct Comparison<'a> {
     /// Of at least two programs in the order of the record, each with its runs by cells.
     pub groups: Vec<&'a Group>,
-    /// Runs that failed or were left out, and what the programs do not provide, a sentence each.
+    /// What the programs do not provide, a sentence each.
     pub notes: Vec<String>,
-}
-
-fn is_on_one_core(setup: &Setup) -> bool {
-    setup.ranks == 1 && setup.comm != Comm::Sim
 }
 
 #[cfg(test)]

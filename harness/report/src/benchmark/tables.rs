@@ -140,10 +140,11 @@ fn phases(group: &Group) -> Table {
     )
 }
 
-/// Several programs on one core, the meshes that are missing, and what the programs do not provide.
+/// Several programs on one core, and what the programs do not provide.
 fn programs(comparison: &Comparison) -> Table {
     let Setup { case, layer_cells_min, .. } = &comparison.groups[0].setup;
-    let cpu_s = |g: &Group| g.cpu_s().map_or(f64::NAN, |time| time.value);
+    let known = |value: Option<f64>| value.map_or("unknown".to_owned(), |v| format!("{v:.3}"));
+    let cpu_s = |g: &Group| g.cpu_s().map(|time| time.value);
     let table = Table::of(
         format!("programs on one core: {case}, n = {layer_cells_min}"),
         &comparison.groups,
@@ -153,11 +154,11 @@ fn programs(comparison: &Comparison) -> Table {
                 _ => g.setup.engine.clone(),
             }),
             ("cells", &|g| grouped(g.cells())),
-            ("CPU\ntime / s", &|g| format!("{:.2}", cpu_s(g))),
+            ("CPU\ntime / s", &|g| known(cpu_s(g))),
             ("of\nit\nsearch / s", &|g| {
                 g.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
             }),
-            ("10⁶\ncells / s / core", &|g| format!("{:.3}", g.cells() as f64 / cpu_s(g) / 1e6)),
+            ("10⁶\ncells / s / core", &|g| known(cpu_s(g).map(|s| g.cells() as f64 / s / 1e6))),
             ("bytes / cell", &|g| format!("{:.1}", g.bytes_per_cell().value)),
         ],
     );
@@ -216,13 +217,16 @@ mod tests {
         let groups = Groups::of(&lines);
         let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
         let table = programs(comparison);
-        assert_eq!(table.rows[0].join(" "), "mesher 2,000,000 2.00 not separate 1.000 0.5");
-        assert_eq!(table.rows[1].join(" "), "slow 1,000,000 2.00 0.50 0.500 1.0");
-        let notes = [
-            "No mesh at spacing 5.00e-2: slow would take 9 s",
-            "slow does not provide: layers, MPI",
-        ];
-        assert_eq!(table.notes, notes);
+        assert_eq!(table.rows[0].join(" "), "mesher 2,000,000 2.000 not separate 1.000 0.5");
+        assert_eq!(table.rows[1].join(" "), "slow 1,000,000 2.000 0.50 0.500 1.0");
+        assert_eq!(table.notes, ["slow does not provide: layers, MPI"]);
+        assert!(text(&groups).contains("n=4 solo:1 metis area: slow would take 9 s"));
         assert!(Groups::of(&lines[..2]).comparisons().is_empty(), "one program is no comparison");
+        let Entry::Run(mut slow) = lines[2].entry.clone() else { panic!("a run") };
+        slow.time_cpu_s = 1.0;
+        let groups = Groups::of(&[lines[1].clone(), line(Entry::Run(slow))]);
+        let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
+        let rows = programs(comparison).rows;
+        assert_eq!(rows[1].join(" "), "slow 1,000,000 unknown 0.50 unknown 1.0");
     }
 }

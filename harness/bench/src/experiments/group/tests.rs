@@ -86,7 +86,7 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
         let session =
             Entry::Session(Box::new(Session { lacks: lacks.into(), ..Session::default() }));
         let groups = Groups::of(&[line(session), of(|_| ()), of(change)]);
-        (groups.all[0].runs.len(), groups.left_out.len(), groups.notes.len())
+        (groups.all[0].runs.len(), groups.missing.len(), groups.notes.len())
     };
     let (kept, left_out) = ((2, 0, 0), (1, 1, 1));
     assert_eq!(with(|_| (), &[]), kept);
@@ -203,8 +203,8 @@ fn a_projection_has_the_network_of_its_machine_and_a_run_with_another_mesh_is_le
     let times: Vec<(f64, usize)> =
         groups.all.iter().map(|group| (group.time_s.value, group.runs.len())).collect();
     assert_eq!(times, [(1.0, 1), (4.0, 1)]);
-    let [left] = &groups.left_out[..] else { panic!("{:?}", groups.left_out) };
-    assert!(left.why.starts_with("its mesh has the digest other"), "{}", left.why);
+    let [why] = &groups.missing[..] else { panic!("{:?}", groups.missing) };
+    assert!(why.contains(": its mesh has the digest other"), "{why}");
 }
 
 #[test]
@@ -320,6 +320,20 @@ fn the_time_of_efficiencies_is_the_median_of_an_even_number_of_runs() {
     let groups = Groups::of(&[of(2.0), of(4.0)]);
     assert_eq!(groups.all[0].time_s.value, 3.0);
     assert_eq!(groups.efficiency(&groups.all[0]).parallel(), 1.0 / 3.0);
+}
+
+/// Their useful time is the wall time, to which no CPU time of a disturbed run is near.
+#[test]
+fn serial_runs_without_phases_are_ideal_and_have_a_cpu_time() {
+    let of = |time_s: f64| {
+        let mut run = run(Comm::Solo, 9, &[("a", &[time_s])]);
+        (run.phases, run.time_cpu_s) = (Vec::new(), 2.0);
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(2.0), of(2.4), of(3.0), of(4.0)]);
+    let (group, e) = (&groups.all[0], groups.efficiency(&groups.all[0]));
+    assert_eq!((e.parallel(), e.global(), group.time_s.value), (1.0, 1.0, 2.7));
+    assert_eq!(group.cpu_s().unwrap().value, 2.0);
 }
 
 #[test]
