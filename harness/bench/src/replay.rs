@@ -118,11 +118,6 @@ impl Expected {
         }
     }
 
-    /// The number of values that are compared: all but times.
-    pub fn compared(&self) -> usize {
-        self.values.iter().filter(|value| !matches!(value.found, Found::Time(_))).count()
-    }
-
     /// Executes the invariants at the head of this file.
     fn check_invariants(&self) {
         let mut seen = BTreeSet::new();
@@ -371,7 +366,7 @@ mod tests {
         let of = |comm, ranks: usize| {
             line(Entry::Run(Box::new(run(comm, 1000, &[("a", &vec![8.0 / ranks as f64; ranks])]))))
         };
-        let lines = [of(Comm::Mpi, 1), of(Comm::Sim, 2), of(Comm::Sim, 4)];
+        let lines = [of(Comm::Sim, 1), of(Comm::Sim, 2), of(Comm::Sim, 4)];
         let replayed = Expected::of(&lines).unwrap().compare(&lines[1..]);
         // A speedup and an efficiency on four ranks, and two times.
         assert_eq!(

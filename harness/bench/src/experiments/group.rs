@@ -121,6 +121,12 @@ impl Group {
         }
     }
 
+    /// Returns that and the ranks, as in `projected on 4 ranks`.
+    pub fn how_on(&self) -> String {
+        let s = if self.setup.ranks == 1 { "" } else { "s" };
+        format!("{} on {} rank{s}", self.how(), self.setup.ranks)
+    }
+
     /// Returns the efficiencies of the typical run relative to that of `reference`.
     pub fn efficiency(&self, reference: &Group) -> Efficiency {
         pop::efficiency(&self.typical, &reference.typical, &self.network)
@@ -252,10 +258,10 @@ impl Groups {
             let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
             // Another partition is no base.
             let is_base = o.ranks == 1 || (weak || alike) && o.division() == s.division();
-            // A measured time has no projected base.
-            let is_measured = s.comm == Comm::Sim || o.comm != Comm::Sim;
-            let [mesh, other] = [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine));
-            same_size && is_base && is_measured && mesh == other
+            // A projected time has a projected base, and a measured one a measured.
+            let [mesh, other] =
+                [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
+            same_size && is_base && mesh == other
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
         let rank = |o: &&Group| {

@@ -26,8 +26,10 @@ pub struct Number {
     pub interval: String,
     /// The confidence that the interval contains the median, in per cent; empty as well.
     pub coverage: String,
-    /// The unit; empty for a ratio.
+    /// The unit in LaTeX; empty for a ratio.
     pub unit: &'static str,
+    /// The base case of a speedup or an efficiency; empty for another quantity.
+    pub base: String,
 }
 
 /// All results of a record.
@@ -52,7 +54,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     let quantities = [
         ("time", Some(group.time_s), "s"),
         ("cpu", group.cpu_s(), "s"),
-        ("rate", Some(group.rates()), "10^6 cells/s/rank"),
+        ("rate", Some(group.rates()), "$10^6$ cells/s/rank"),
         ("memory", Some(group.bytes_per_cell()), "B/cell"),
         ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
         ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
@@ -64,7 +66,8 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         assert!(low <= value && value <= high, "{key}: {value} is not in its interval");
         let ends = [[low, high].map(digits).join("--"), median.per_cent().to_string()];
         let [interval, coverage] = if median.coverage > 0.0 { ends } else { Default::default() };
-        Some(Number { key, value: digits(value), interval, coverage, unit })
+        let base = if unit.is_empty() { base.how_on() } else { String::new() };
+        Some(Number { key, value: digits(value), interval, coverage, unit, base })
     };
     let (key, value) = (format!("{setup}/cells"), grouped(group.cells()));
     let cells = Number { key, value, unit: "cells", ..Number::default() };
@@ -73,7 +76,8 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
 
 const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \result[interval]{KEY} its interval, \result[coverage]{KEY} the
 % confidence of that in per cent (95 and more need six repetitions), \result[unit]{KEY} its unit. A projected time, and what
-% follows from it, is the critical path of medians per rank, and can be below that of every repetition.
+% follows from it, is the critical path of medians per rank, and can be below that of every repetition. A speedup and an
+% efficiency are over the base case at the end of their line, which counts as ideal in a speedup if it has several ranks.
 \newcommand{\result}[2][value]{\ifcsname result/#2/#1\endcsname\csname result/#2/#1\endcsname
   \else\PackageError{numbers}{the record has no result #2}{}\fi}
 \newcommand{\defresult}[5]{\expandafter\def\csname result/#1/value\endcsname{#2}%
@@ -81,17 +85,14 @@ const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \resu
   \expandafter\def\csname result/#1/unit\endcsname{#5}}
 ";
 
-/// The unit of a result in LaTeX.
-fn unit_tex(number: &Number) -> String {
-    number.unit.replace("10^6", "$10^6$")
-}
-
 /// `numbers.tex`.
 pub fn tex(numbers: &[Number]) -> String {
     let mut out = HEAD.to_owned();
-    for number @ Number { key, value, interval, coverage, .. } in numbers {
-        let unit = unit_tex(number);
-        out += &format!("\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{coverage}}}{{{unit}}}\n");
+    for Number { key, value, interval, coverage, unit, base } in numbers {
+        let over = if base.is_empty() { "" } else { " % over " };
+        out += &format!(
+            "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{coverage}}}{{{unit}}}{over}{base}\n"
+        );
     }
     out
 }
@@ -198,7 +199,7 @@ fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
         return Some(format!("the record has no result {key}"));
     };
     let [here, there] =
-        [here, &[&n.value, &n.interval, &n.coverage, &unit_tex(n)]].map(|of| of.join(" "));
+        [here, &[&n.value, &n.interval, &n.coverage, n.unit]].map(|of| of.join(" "));
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
@@ -258,12 +259,10 @@ mod tests {
         assert!(keys.iter().any(|key| key.ends_with("/time-2")), "{keys:?}");
         let speedup = all.iter().find(|n| n.key.ends_with("/2/projected/speedup")).unwrap();
         assert!(speedup.value.starts_with("1.3"), "{speedup:?}");
-        assert!(
-            tex(&all).contains(&format!(
-                "\\defresult{{{}}}{{{}}}{{}}{{}}{{}}",
-                speedup.key, speedup.value
-            ))
-        );
+        assert!(tex(&all).contains(&format!(
+            "\\defresult{{{}}}{{{}}}{{}}{{}}{{}} % over projected on 1 rank\n",
+            speedup.key, speedup.value
+        )));
     }
 
     #[test]
@@ -281,7 +280,7 @@ mod tests {
     fn number(key: &str, value: &str, interval: &str) -> Number {
         let coverage = if interval.is_empty() { "" } else { "75" }.into();
         let [key, value, interval] = [key, value, interval].map(str::to_owned);
-        Number { key, value, interval, coverage, unit: "s" }
+        Number { key, value, interval, coverage, unit: "s", ..Number::default() }
     }
 
     #[test]

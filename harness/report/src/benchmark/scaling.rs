@@ -67,9 +67,7 @@ fn projected(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> V
 fn base_cases(groups: &Groups, of: &[&Group]) -> String {
     let text = |group: &&Group| {
         let base = groups.reference(group);
-        let ranks = base.setup.ranks;
-        let s = if ranks == 1 { "" } else { "s" };
-        format!("{} on {ranks} rank{s}, {} s", base.how(), digits(base.time_s.value))
+        format!("{}, {} s", base.how_on(), digits(base.time_s.value))
     };
     distinct(of.iter().map(text)).join("; ")
 }

@@ -77,6 +77,7 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("parallel\nefficiency", &|(_, e)| format!("{:.3}", e.parallel())),
             ("computation\nscaling", &|(g, e)| of_base(g, e.computation_scaling)),
             ("global\nefficiency", &|(g, e)| of_base(g, e.global())),
+            ("base case", &|(g, _)| groups.reference(g).how_on()),
             ("10⁶\ncells / s / rank", &|(g, _)| format!("{:.2}", g.rates().value)),
             ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],

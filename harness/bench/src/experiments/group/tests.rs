@@ -336,6 +336,20 @@ fn serial_runs_without_phases_are_ideal_and_have_a_cpu_time() {
     assert_eq!(group.cpu_s().unwrap().value, 2.0);
 }
 
+/// It would depend on the other series of a study.
+#[test]
+fn a_projected_time_has_no_measured_base() {
+    let of = |comm: Comm, ranks: usize, experiment: &str| {
+        let mut run = run(comm, 9, &[("a", &vec![8.0; ranks])]);
+        run.setup.experiment = experiment.into();
+        line_of(run)
+    };
+    let weights = [4, 8].map(|ranks| of(Comm::Sim, ranks, "weights"));
+    let groups = Groups::of(&[&weights[..], &[of(Comm::Solo, 1, "layers")]].concat());
+    let base = groups.reference(&groups.all[1]);
+    assert_eq!(base.how_on(), "projected on 4 ranks");
+}
+
 #[test]
 fn two_series_of_a_case_have_bases_of_their_own() {
     let of = |ranks: usize, cells: u64, size: f64| {
