@@ -290,7 +290,10 @@ fn measured_runs_have_their_causes_on_the_page() {
     lines.retain(|line| !matches!(&line.entry, Entry::Run(run) if run.setup.comm == Comm::Sim));
     let place = tempfile::tempdir().unwrap();
     let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
-    assert!(page.contains("uav by mesher, strong, 50,000,000 cells, measured: "), "{page}");
+    assert!(
+        page.contains("uav by mesher, strong, default, 50,000,000 cells, measured: "),
+        "{page}"
+    );
 }
 
 #[test]

@@ -159,7 +159,9 @@ type Weight<'a> = &'a dyn Fn(&Phase) -> f64;
 /// Returns the sentence for a run relative to its reference run, with the reason for an efficiency above 1.
 pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
     let e = efficiency(run, reference, network);
-    let (ranks, global) = (run.setup.ranks, 100.0 * e.global());
+    let (ranks, percent) = (run.setup.ranks, 100.0 * e.global());
+    // Its own base has a computation scaling of 1.
+    let of = if reference.setup == run.setup { "parallel" } else { "global" };
     let uneven = |phase: &Phase| phase.useful_s.max - phase.useful_s.sum / ranks as f64;
     let idle = |phase: &Phase| match run.setup.comm {
         Comm::Sim => messages_s(phase, network),
@@ -195,7 +197,7 @@ pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
         }
     };
     let above = above_one(&[e]).map_or(String::new(), |reason| format!(". {reason}"));
-    format!("{global:.0} % at {ranks} ranks: {why}{above}")
+    format!("{of} efficiency of {percent:.0} % at {ranks} ranks: {why}{above}")
 }
 
 /// Returns the fraction of all cells in the largest base leaf, if the program reports it.
@@ -323,7 +325,7 @@ mod tests {
         let mut two = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[3.0, 1.0])]);
         let text = cause(&two, &one, &FREE);
         assert!(
-            text.starts_with("67 % at 2 ranks: the work of the ranks is uneven (33 %), mostly in the phase grade, where rank 0"),
+            text.starts_with("global efficiency of 67 % at 2 ranks: the work of the ranks is uneven (33 %), mostly in the phase grade, where rank 0"),
             "{text}"
         );
         two.counters.insert("base_leaf_cells_max".into(), Spread::of(&[70.0, 10.0]));

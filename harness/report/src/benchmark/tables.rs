@@ -37,7 +37,8 @@ pub fn causes(groups: &Groups) -> Vec<String> {
     let cause = |group: &Group| {
         let (s, cells, how) = (&group.setup, grouped(group.cells()), group.how());
         let cause = pop::cause(&group.typical, &groups.reference(group).typical, &group.network);
-        format!("{}, {}, {cells} cells, {how}: {cause}", Subject::of(s), s.experiment)
+        let (subject, experiment, division) = (Subject::of(s), &s.experiment, s.division());
+        format!("{subject}, {experiment}, {division}, {cells} cells, {how}: {cause}")
     };
     groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
 }
@@ -186,7 +187,7 @@ mod tests {
             "1.500",
             "3.00 – 3.00",
             "0 %",
-            "67 % at 2 ranks",
+            "strong, metis area, 1,000,000 cells, projected: global efficiency of 67 % at 2 ranks",
             "+20.0 %",
             "projected",
         ] {
