@@ -181,6 +181,7 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
     };
     let balance = bars("balance-uav-4M-64");
     assert!(balance.contains(",2,morton former,cells,measured\n"), "{balance}");
+    assert!(!balance.contains("target"), "{balance}");
     let load = std::fs::read_to_string(place.path().join("figures/per-rank-uav-64.csv")).unwrap();
     assert!(has_row(&load, "63", ",useful time,projected"), "{load}");
 }

@@ -250,26 +250,18 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
     let ends = (-0.5, of.len() as f64 - 0.5);
-    let mut series = vec![
-        bars("cells", Provenance::Measured, 0, lambdas.into_iter()),
-        Series::vertical("target, 1.10", 1, 1.1, ends),
-    ];
+    let mut series = vec![bars("cells", Provenance::Measured, 0, lambdas.into_iter())];
     // A base leaf is never divided, so no partition beats a rank that has only the largest one.
     let largest = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical)).reduce(f64::min);
     let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
     series.extend(bound.map(|x| Series::vertical(&format!("lower bound, {x:.2}"), 6, x, ends)));
-    let baseline = match of.iter().any(|g| g.setup.partitioner == "paper") {
-        true => {
-            "The baseline is the paper's partition (paper) in the root of this case, which is ours; other depths are automatic."
-        }
-        false => "Their depth is automatic, so that no partition here is the paper's.",
-    };
     let (label, cells) = (cells_label(cells), grouped(cells));
     let is_sim = of[0].setup.comm == Comm::Sim;
     let [kind, ending] = if is_sim { ["simulated ranks", ""] } else { ["ranks", "-mpi"] };
     let caption = format!(
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} {kind}, by the partitioner of the base \
-         tree and the weights of its leaves. {baseline} The counts repeat exactly."
+         tree and the weights of its leaves. Base leaves have an automatic depth, but for the paper's partition (paper), in the root of this case, \
+         which is ours. The counts repeat exactly."
     );
     let names = of.iter().map(|g| g.setup.division()).collect();
     let id = format!("balance-{}-{label}-{ranks}{ending}", subject.file());
