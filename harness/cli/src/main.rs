@@ -54,7 +54,9 @@ fn refuse(error: &clap::Error) -> ExitCode {
     if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         let text = error.render().to_string();
         let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-        let is_said = |line: &&str| !line.starts_with("Usage:") && !line.starts_with("For more");
+        // The tip is for names of files, and most are negative numbers.
+        let ends = ["Usage:", "For more", "tip: to pass"];
+        let is_said = |line: &&str| ends.iter().all(|end| !line.starts_with(end));
         let sentence = lines.take_while(is_said).collect::<Vec<_>>().join(" ");
         let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
         eprintln!("harness: {sentence}; see --help");

@@ -109,6 +109,7 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         ("mesh --out a.svg --slice z=0 --clip -1,-1,0.3,1,1,0.9", 2, "no leaf of the selection"),
         ("mesh --out a.svg --case other.toml", 2, "the mesh is not of the case other"),
         ("mesh --out a.svg --zoom 0", 2, "from 1 to 1000000"),
+        ("mesh --out a.svg --zoom -3", 2, "unexpected argument '-3' found; see --help"),
         ("nowhere.toml --out a.svg", 2, "nowhere.toml"),
         ("case.toml --out a.svg --case case.toml", 2, "is not a leaf-set directory"),
     ];

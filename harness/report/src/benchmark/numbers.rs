@@ -150,13 +150,15 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
     Checked { compared, by_hand, findings: found.iter().filter_map(finding).collect() }
 }
 
+/// How a text includes another. The directory of `\import` has its slash.
+const INCLUDED: &str = r#"\\(?:(?:sub)?import\s*\{\s*([^}]*?)\s*\}\s*\{\s*([^}]*?)\s*\}|(?:input|include|subfile)(?:\s*\{\s*"?([^}"]*?)"?\s*\}|[ \t]+"?([^\s\\{}"]+)))"#;
+
 /// The texts that a text includes, as it names them, without the figures of a report.
 pub fn included(text: &str) -> Vec<String> {
-    let uses = pattern(r"\\(?:input|include)(?:\s*\{\s*([^}]*?)\s*\}|[ \t]+([^\s\\{}]+))");
     let code = without_comments(text);
-    let names = uses
-        .captures_iter(&code)
-        .map(|of| of.iter().skip(1).flatten().map(|m| m.as_str()).collect());
+    let name = |of: Captures| of.iter().skip(1).flatten().map(|m| m.as_str()).collect();
+    let uses = pattern(INCLUDED);
+    let names = uses.captures_iter(&code).map(name);
     names.filter(|name: &String| !name.starts_with(r"\figures/")).collect()
 }
 
@@ -273,8 +275,9 @@ mod tests {
 
     #[test]
     fn included_texts_are_found() {
-        let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}\\input g.tex\n";
-        assert_eq!(included(text), ["a", "c.tex", "e", "g.tex"]);
+        let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}\\input g.tex\n\
+                    \\subfile{h}\\import{i/}{j}\\subimport{k/}{l.tex}\\input{\"m n/o\"}\\inputlineno{p}";
+        assert_eq!(included(text), ["a", "c.tex", "e", "g.tex", "h", "i/j", "k/l.tex", "m n/o"]);
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {

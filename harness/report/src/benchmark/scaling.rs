@@ -44,7 +44,8 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         out.extend(projected(groups, subject, &all, &subject.file()));
     }
     for (subject, all) in by_subject(groups, "weights") {
-        for (_, of) in by_key(all, |g| (g.cells(), g.setup.ranks, g.setup.comm)) {
+        let several = all.into_iter().filter(|group| group.setup.ranks > 1);
+        for (_, of) in by_key(several, |g| (g.cells(), g.setup.ranks, g.setup.comm)) {
             out.extend(balance(subject, &of));
         }
     }
@@ -241,12 +242,9 @@ fn bars(name: &str, how: Provenance, style: usize, lengths: impl Iterator<Item =
     Series::new(name, how, style, points).drawn_as(Kind::Bars)
 }
 
-/// Load imbalance of cells of one mesh for weights and partitioners; `None` on one rank, or if some run did not count them.
+/// Load imbalance of cells of one mesh on several ranks, for weights and partitioners; `None` if some run did not count them.
 fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let (cells, ranks) = (of[0].cells(), of[0].setup.ranks);
-    if ranks == 1 {
-        return None;
-    }
     let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
     let ends = (-0.5, of.len() as f64 - 0.5);

@@ -337,7 +337,7 @@ pub fn label(name: &str) -> String {
 /// Programs that the command line names.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Given {
-    /// The mesher [default: next to the harness]
+    /// The program of the engine that is named, or the mesher; refused with several engines [default: next to the harness]
     #[arg(long, value_name = "PATH")]
     pub mesher: Option<Input>,
     /// The reference [default: next to the harness]
