@@ -4,7 +4,7 @@
 //! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
 //! variety of a mesh and not with its size, up to [`NODES_MAX`]. Without a case, the checks use the requirements in the
 //! manifest, and the head of each names what it cannot detect. With a case, they are a whole check: a mesh that passes is the
-//! mesh of the definition. With promises of less than the definition, exactly those are checked.
+//! mesh of the definition, and T0 in its place is a finding. With promises of less than the definition, exactly those are checked.
 //!
 //! Invariants of a report: each result has its own invariants; the tree of a mesh has no more distinct octants than leaves and their
 //! ancestors.
@@ -20,7 +20,7 @@ use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::files::write_atomically;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Tree as Kind};
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::number::labelled;
 use contract::octant::LEVEL_MAX;
@@ -131,6 +131,10 @@ fn audit_within(most: usize, dir: &Path, case: Option<&Case>, promises: &Promise
             let mut files = CheckResult::new(checks::FILES);
             let tree = manifest.hyper_tree_grid.as_deref();
             files.examined = manifest.parts.len() as u64 + u64::from(tree.is_some());
+            let wanted = case.map_or(manifest.tree, |case| case.rules.tree);
+            if (manifest.tree, wanted) == (Kind::Base, Kind::Final) {
+                files.report("mesh.json states the tree \"base\": T0, which is not the final mesh");
+            }
             let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
             let beside_parts = tree.filter(|_| mesh.tree_file.is_none());

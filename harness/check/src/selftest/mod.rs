@@ -167,8 +167,10 @@ fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::
         }
     };
     let definition = Promises::of_definition();
-    let audit = audit::audit_against(dir, None, &definition).checks;
-    let whole = audit::audit_against(dir, Some(&correct.case), &definition).checks;
+    let mut case = correct.case.clone();
+    case.rules.tree = mutation.tree;
+    let [audit, whole] =
+        [None, Some(&case)].map(|case| audit::audit_against(dir, case, &definition).checks);
     fs::remove_dir_all(dir)?;
     Ok([checks, audit, whole])
 }

@@ -97,7 +97,9 @@ proptest! {
         for set in [&correct.mesh, &correct.base] {
             let dir = tempfile::tempdir().unwrap();
             set.write(dir.path()).unwrap();
-            for case in [None, Some(&correct.case)] {
+            let mut case = correct.case.clone();
+            case.rules.tree = set.manifest.tree;
+            for case in [None, Some(&case)] {
                 let report = audit::audit_against(dir.path(), case, &definition);
                 prop_assert!(report.holds(), "{text}{report}");
             }

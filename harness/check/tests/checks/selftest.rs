@@ -244,6 +244,10 @@ fn every_corruption_of_leaves_is_found_in_many_parts() {
     assert!(correct.mesh.words.len() > 20_000);
     correct.mesh = in_many_parts(&correct.mesh);
     assert_eq!(found(&correct.mesh, Some(&correct.case)), [""; 0]);
+    assert_eq!(
+        (found(&correct.base, None), found(&correct.base, Some(&correct.case))),
+        (vec![], vec!["files"])
+    );
     let mut planted = 0;
     for mutant in selftest::catalogue() {
         let Some(mutation) = mutant.make(&correct) else { continue };
