@@ -233,8 +233,9 @@ pub struct Manifest {
     /// Components of T0 by side; `None` if the program does not count them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub components: Option<Components>,
-    /// Components decided by majority.
-    pub components_ambiguous: Ambiguous,
+    /// Components decided by majority; `None` if the program does not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub components_ambiguous: Option<Ambiguous>,
     /// Digest of all leaves.
     pub digest: Digest,
     /// Digest of the leaves in each level-3 octant, indexed by [`octant_index`].

@@ -60,7 +60,8 @@ fn stated(manifest: &Manifest) -> Value {
     let user = |at: [i64; 3]| root.rounded(root.to_user(at));
     let mut rounded = manifest.clone();
     let enclosed = rounded.components.iter_mut().map(|components| &mut components.enclosed.example);
-    for place in enclosed.chain([&mut rounded.components_ambiguous.example]).flatten() {
+    let ambiguous = rounded.components_ambiguous.iter_mut().map(|ambiguous| &mut ambiguous.example);
+    for place in enclosed.chain(ambiguous).flatten() {
         *place = root.quantise(*place).map_or(*place, user);
     }
     let mut stated = serde_json::to_value(rounded).expect("a manifest is representable in JSON");
@@ -118,10 +119,10 @@ pub(super) fn components(
     keys: &[&str],
     result: &mut CheckResult,
 ) {
-    let mut expected = other.clone();
-    expected.leaks = manifest.leaks.clone().map(|leaks| other.leaks.clone().unwrap_or(leaks));
-    expected.components = manifest.components.map(|claimed| other.components.unwrap_or(claimed));
-    let lines = differing(keys, ("the manifest", manifest), (owner, &expected));
+    let entries = [manifest, other].map(stated);
+    let has = |key: &&&str| entries.iter().all(|of| of.pointer(&format!("/{key}")).is_some());
+    let keys: Vec<_> = keys.iter().filter(has).collect();
+    let lines = differing(&keys, ("the manifest", manifest), (owner, other));
     lines.into_iter().for_each(|line| result.report(line));
 }
 

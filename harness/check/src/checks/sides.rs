@@ -3,7 +3,7 @@
 //!
 //! Section 4 of reference/DEFINITION.md. With the case: the components of T0's leaves (connected through faces) are
 //! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf of the mesh must have
-//! the side of T0's leaf. The manifest must state the number of ambiguous components, and the leaks. Without the case:
+//! the side of T0's leaf. What the manifest states of ambiguous components and leaks must be true. Without the case:
 //! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that
 //! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
 //! definition is judged beyond a band around the geometry (`super::region`).
@@ -56,7 +56,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         result.report(format_args!("the leaf is {given}, but {why}: {leaf}"));
     });
     let manifest = subject.manifest;
-    let components_ambiguous = ambiguous(manifest.components_ambiguous.example, truth, terms);
+    let components_ambiguous = manifest.components_ambiguous.map(|a| ambiguous(a, truth, terms));
     let leaks = manifest.leaks.as_ref().map(|_| leaks(subject, truth));
     let expected = Manifest { components_ambiguous, leaks, ..terms.clone() };
     let keys = ["components_ambiguous", "leaks"];
@@ -86,10 +86,10 @@ fn not_kept(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 }
 
 /// The ambiguous components of T0, with the example that is claimed if it is one.
-fn ambiguous(claimed: Option<[f64; 3]>, truth: &Truth, terms: &Manifest) -> Ambiguous {
+fn ambiguous(claimed: Ambiguous, truth: &Truth, terms: &Manifest) -> Ambiguous {
     let found: Vec<_> = truth.components.iter().filter(|c| c.is_ambiguous()).collect();
     let places = || found.iter().map(|c| terms.root.to_user(c.first.centre()));
-    let is_claimed = |at: &[f64; 3]| claimed.is_some_and(|claimed| terms.same_place(claimed, *at));
+    let is_claimed = |at: &[f64; 3]| claimed.example.is_some_and(|it| terms.same_place(it, *at));
     let example = places().find(is_claimed).or_else(|| places().next());
     Ambiguous { count: found.len() as u64, example }
 }

@@ -52,10 +52,10 @@ pub(super) const MUTANTS: &[Mutant] = &[
         labelled(s, Side::Crossing, |w| !word::is_crossing(w) && of_surface(w))
     }),
     edit("one ambiguous component too many in the manifest", "sides", INFORMED, |m| {
-        m.components_ambiguous.count += 1;
+        m.components_ambiguous.get_or_insert_default().count += 1;
     }),
     edit("wrong example of an ambiguous component", "sides", INFORMED, |m| {
-        m.components_ambiguous.example = Some(m.root.origin);
+        m.components_ambiguous.get_or_insert_default().example = Some(m.root.origin);
     }),
     words("one leaf of an enclosed component kept", "kept", INFORMED, |s| enclosed_kept(s, 1)),
     words("enclosed component kept", "kept", INFORMED, |s| enclosed_kept(s, usize::MAX)),

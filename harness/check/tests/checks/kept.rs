@@ -95,7 +95,8 @@ fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
     assert_eq!(found(|m| m.components = None), 0);
     assert_eq!(found(|m| m.components.as_mut().unwrap().inside += 1), 1);
     assert_eq!(found(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
-    assert_eq!(found(|m| m.components_ambiguous.count += 1), 1);
+    assert_eq!(found(|m| m.components_ambiguous.as_mut().unwrap().count += 1), 1);
+    assert_eq!(found(|m| m.components_ambiguous = None), 0, "an import knows none");
 }
 
 /// A box within a box: the space within the inner one is outside by parity, and the far field does not reach it.
