@@ -1,4 +1,4 @@
-//! The layer of correctness: `harness verify` on the candidate and the gate's cases, serially and on the ranks of the rules.
+//! The layer of correctness: `harness verify` on candidate and baseline and the gate's cases, serially and on the ranks of the rules.
 //!
 //! A mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more findings. A check that had
 //! nothing to check is compared only if the baseline's had nothing either: what a mesh no longer states cannot be found wrong.
@@ -15,7 +15,7 @@ use run::verify::report::{CaseReport, Check, Outcome, RUNS};
 use run::verify::verify;
 use std::cmp::Ordering;
 
-/// Verifies the candidate on the cases of this layer: every check of what it promises. Oracles and p4est are left to
+/// Verifies both programs on the cases of this layer: every check of what it promises. Oracles and p4est are left to
 /// `harness verify`.
 ///
 /// # Errors
@@ -23,13 +23,8 @@ use std::cmp::Ordering;
 pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<()> {
     for case in bench.cases_of(LayerName::Correctness) {
         let report = verified(bench, &bench.candidate.engine, case)?;
-        let is_plain = report.checks.iter().all(|check| !check.failed() && !is_unchecked(check));
-        let baseline = match &bench.baseline {
-            // Nothing of the baseline can be better.
-            Some(_) if is_plain => Some(report.clone()),
-            Some(subject) => Some(verified(bench, &subject.engine, case)?),
-            None => None,
-        };
+        let baseline = bench.baseline.as_ref().map(|it| verified(bench, &it.engine, case));
+        let baseline = baseline.transpose()?;
         layer.findings.extend(findings(case, &report, baseline.as_ref()));
     }
     Ok(())
@@ -94,23 +89,19 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
     };
     let verdict = match new.cmp(&old.unwrap_or(0)) {
         Ordering::Less => Verdict::Improvement,
+        Ordering::Equal if old.is_none() => Verdict::Measured,
         Ordering::Equal => Verdict::Unchanged,
         Ordering::Greater => Verdict::Regression,
     };
-    Some(match baseline {
-        None => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
-        Some(_) if check.name == RUNS && old > Some(0) => {
+    Some(match (baseline, old) {
+        (None, _) => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
+        (_, Some(1..)) if check.name == RUNS => {
             let who = if new > 0 { "neither program makes" } else { "the baseline does not make" };
             let why = before.filter(|old| old.failed()).map_or(why, first_line);
             noted(Verdict::Missing, format!("{who} a mesh: {why}"))
         }
-        Some(_) if old.is_none() => {
-            noted(verdict, format!("the baseline's was not checked: {why}"))
-        }
-        Some(_) => {
-            let values = [old.unwrap_or(0), new].map(|count| count as f64);
-            noted(verdict, why.to_owned()).of_values(values)
-        }
+        (_, None) => noted(verdict, format!("the baseline's was not checked: {why}")),
+        (_, Some(old)) => noted(verdict, why.to_owned()).of_values([old, new].map(|n| n as f64)),
     })
 }
 
@@ -202,7 +193,7 @@ mod tests {
         let verdicts = |of: &CaseReport| -> Vec<Verdict> {
             findings(&on(&[]), of, None).iter().map(|found| found.verdict).collect()
         };
-        assert_eq!(verdicts(&case(&[])), [Verdict::Unchanged; 3]);
+        assert_eq!(verdicts(&case(&[])), [Verdict::Measured; 3]);
         assert!(verdicts(&case(&[("layer", 1)])).contains(&Verdict::Regression));
     }
 

@@ -96,6 +96,29 @@ fn a_program_without_times_is_named() {
 }
 
 #[test]
+fn a_baseline_without_a_mesh_has_no_correctness_to_compare_with() {
+    let fixture = Fixture::new();
+    let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
+    fixture.write("case.toml", &case.replace("spacing_min = 1.0", "spacing_min = 8.0"));
+    let promises = "[promises]\ncomplete = true\ndeterministic = true\n";
+    let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    fixture.write("engine.toml", &(engine + promises));
+    fixture.program("broken", "#!/bin/sh\necho no >&2\nexit 3\n");
+    let rules = "[[case]]\nname = \"case.toml\"\nlayers = [\"correctness\"]\n";
+    fixture.write("gate.toml", rules);
+    let gate = "gate --engine engine.toml --rules gate.toml --layers correctness";
+    for (baseline, code, what) in [
+        ("--baseline engine --candidate engine", 0, "unchanged"),
+        ("--baseline broken --candidate engine", 3, "the baseline does not make a mesh"),
+        ("--candidate engine", 0, "measured"),
+    ] {
+        let outcome = fixture.harness(&format!("{gate} {baseline}"));
+        assert_eq!(outcome.code, code, "{}", outcome.printed);
+        assert!(outcome.printed.contains(what), "{}", outcome.printed);
+    }
+}
+
+#[test]
 fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     let fixture = Fixture::new();
     fixture.engine("more", 1);
