@@ -70,8 +70,9 @@ fn check_rows(rows: &[Vec<String>], report: &Report) {
 fn numbers(Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<String> {
     let measured = run.map(|run| {
         let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
-        let rate = format!("{:.3}", run.cells_per_s() / 1e6);
-        [time_s.unwrap_or("-".to_owned()), rate, format!("{:.1}", run.bytes_per_cell())]
+        let memory = run.bytes_per_cell().map(|bytes| format!("{bytes:.1}"));
+        let rate = Some(format!("{:.3}", run.cells_per_s() / 1e6));
+        [time_s, rate, memory].map(|number| number.unwrap_or("-".to_owned()))
     });
     let counts = [pass, fail, left_out].map(|n| n.to_string());
     [counts, measured.unwrap_or(["-"; 3].map(str::to_owned))].concat()
@@ -211,6 +212,10 @@ mod tests {
             ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100", "0.076", "10.0"]
         );
         assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.152", "10.0"]);
+        let mut unknown = sample();
+        unknown.cases[0].runs[0].peak_rss_bytes = None;
+        assert!(table(&unknown).contains("0.076       -\n"), "{}", table(&unknown));
+        assert!(json(&unknown).contains("\"peak_rss_bytes\": null"), "{}", json(&unknown));
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub fn report() -> Report {
         time_wall_s: 0.1,
         is_time_reported: true,
         time_process_s: 0.2,
-        peak_rss_bytes: 76_000,
+        peak_rss_bytes: Some(76_000),
     };
     let on_ranks = Run { layout: Some(layout.clone()), time_wall_s: 0.05, ..run.clone() };
     let mut sides = Check::new("serial", "oracles", Outcome::held(7600));

@@ -85,7 +85,7 @@ impl CaseRun<'_> {
             program: program.to_owned(),
             layout: layout.rank_count().map(|_| layout.clone()),
             cells: report.cells,
-            peak_rss_bytes: report.peak_rss_bytes_total(),
+            peak_rss_bytes: Some(report.peak_rss_bytes_total()).filter(|bytes| *bytes > 0),
             digest: report.digest.unwrap_or_default(),
             time_wall_s: report.time_wall_s.unwrap_or(finished.time_wall_s),
             is_time_reported: report.time_wall_s.is_some(),

@@ -42,8 +42,8 @@ pub struct Run {
     pub is_time_reported: bool,
     /// Wall time by the harness's clock, in seconds, including the start and end of the processes.
     pub time_process_s: f64,
-    /// Peak resident memory of all ranks together.
-    pub peak_rss_bytes: u64,
+    /// Peak resident memory of all ranks together, if it is known.
+    pub peak_rss_bytes: Option<u64>,
 }
 
 impl Run {
@@ -52,9 +52,9 @@ impl Run {
         self.cells as f64 / self.time_wall_s.max(1e-9)
     }
 
-    /// Peak memory per cell.
-    pub fn bytes_per_cell(&self) -> f64 {
-        self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
+    /// Peak memory per cell, if it is known.
+    pub fn bytes_per_cell(&self) -> Option<f64> {
+        Some(self.peak_rss_bytes? as f64 / self.cells.max(1) as f64)
     }
 }
 
