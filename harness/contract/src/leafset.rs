@@ -128,6 +128,7 @@ impl LeafSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TREE;
     use crate::testing::{leaf_set, words_of};
 
     #[test]
@@ -193,8 +194,19 @@ mod tests {
                 .ends_with("is not a plain file name")
         );
         assert!(
-            why(&|m| drop(m.parts.pop())).ends_with("a part file that the manifest does not name")
+            why(&|m| drop(m.parts.pop()))
+                .ends_with("a file of leaves that the manifest does not name")
         );
+        fs::write(dir.path().join(TREE), "").unwrap();
+        for has_tree in [false, true] {
+            let found = why(&|m| {
+                if has_tree {
+                    (m.parts, m.hyper_tree_grid) = (Vec::new(), Some(TREE.to_owned()));
+                }
+            });
+            assert!(found.ends_with("a file of leaves that the manifest does not name"), "{found}");
+        }
+        fs::remove_file(dir.path().join(TREE)).unwrap();
         assert!(
             why(&|m| m.parts[1].file = "absent.npy".to_owned())
                 .contains("absent.npy: the part cannot be read")

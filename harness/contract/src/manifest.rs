@@ -263,6 +263,11 @@ impl Manifest {
         }
     }
 
+    /// The names of its files.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
+        self.parts.iter().map(|part| &part.file).chain(&self.hyper_tree_grid)
+    }
+
     /// The entry that no mesh has, because the schema is another, a number is out of range, or a name is a path; `None` if there is none. Checks
     /// compute with all these numbers.
     pub fn fault(&self) -> Option<String> {
@@ -270,8 +275,7 @@ impl Manifest {
             return Some(format!("its schema is {:?}, not {SCHEMA:?}", self.schema));
         }
         // A path instead of a file name could refer to the leaves of another mesh.
-        let mut names = self.parts.iter().map(|p| &p.file).chain(&self.hyper_tree_grid);
-        if let Some(name) = names.find(|name| Path::new(name).components().count() != 1) {
+        if let Some(name) = self.names().find(|name| Path::new(name).components().count() != 1) {
             return Some(format!("{name:?} is not a plain file name"));
         }
         let in_root = |at: &[i64; 3]| at.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));

@@ -3,8 +3,8 @@
 //! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`], [`Mesh::leaves`] and [`Mesh::tree`] refuse words that are
 //! not a linear oct-tree, for all who rely on one.
 //!
-//! Opening fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an array of words, or a part file
-//! that the manifest does not name. The checks establish whether the contents are correct.
+//! Opening fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an array of words, or words or a
+//! tree that the manifest does not name. The checks establish whether the contents are correct.
 
 use crate::case::Case;
 use crate::digest::Digest;
@@ -23,6 +23,9 @@ use std::path::{Path, PathBuf};
 /// Maximum number of distinct nodes of a tree in memory. A node needs about 50 bytes, and 20 more in the check of layers: pages of tables that are larger than their contents are not
 /// in memory.
 pub const NODES_MAX: usize = 128_000_000;
+
+/// Name of the tree in a directory.
+pub(crate) const TREE: &str = "mesh.vtkhdf";
 
 /// A leaf-set directory whose manifest and files were opened. No leaf has been read.
 #[derive(Debug)]
@@ -64,23 +67,22 @@ impl Mesh {
     /// If the directory is not a leaf set.
     pub fn open(dir: &Path) -> Result<Self> {
         let manifest = Manifest::read(dir)?;
-        if manifest.parts.is_empty()
-            && let Some(name) = &manifest.hyper_tree_grid
-        {
-            return Self::of_tree(dir, name, &manifest);
-        }
         let open = |part: &Part| {
             let path = dir.join(&part.file);
             PartFile::open(&path).map_err(|why| why.of_file(&path))
         };
-        let parts = manifest.parts.iter().map(open).collect::<Result<_, _>>()?;
-        // A part file that the manifest does not name shows that manifest and directory do not belong together.
-        let is_extra = |name: &String| !manifest.parts.iter().any(|part| part.file == *name);
-        if let Some(name) = part_names(dir)?.into_iter().find(is_extra) {
-            let why = "a part file that the manifest does not name";
+        let parts = manifest.parts.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+        // Words or a tree that the manifest does not name show that manifest and directory do not belong together.
+        let mut found = part_names(dir)?;
+        found.extend(dir.join(TREE).exists().then(|| TREE.to_owned()));
+        if let Some(name) = found.into_iter().find(|name| !manifest.names().any(|it| it == name)) {
+            let why = "a file of leaves that the manifest does not name";
             return Err(Failure::about(&dir.join(name), why));
         }
-        Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file: None })
+        match &manifest.hyper_tree_grid {
+            Some(name) if parts.is_empty() => Self::of_tree(dir, name, &manifest),
+            _ => Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file: None }),
+        }
     }
 
     /// Opens the tree of a directory with this manifest, whether or not it has parts.

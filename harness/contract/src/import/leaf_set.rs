@@ -10,6 +10,7 @@ use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset::{self, LeafSet};
 use crate::manifest::{self, Manifest, Part, Sides, Tree};
+use crate::mesh::TREE;
 use crate::npy;
 use crate::word::{self, Order};
 use std::fs;
@@ -66,9 +67,6 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let is_same = (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells;
     assert!(is_same, "cells fill {of_cells} of the root, and their leaves {of_leaves}");
 }
-
-/// Name of the tree in a directory.
-const TREE: &str = "mesh.vtkhdf";
 
 /// A tree, and the manifest of its leaves.
 pub struct ImportedTree {
