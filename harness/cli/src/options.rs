@@ -59,7 +59,8 @@ pub fn read_case(name: &str) -> Result<Case> {
 /// Parses a root from four numbers.
 pub fn root(text: &str) -> Result<Root, String> {
     let [x, y, z, edge] = numbers(text, "X,Y,Z,EDGE")?;
-    Ok(Root { origin: [x, y, z], edge })
+    let root = Root { origin: [x, y, z], edge };
+    root.is_cube().then_some(root).ok_or_else(|| "give an edge that is positive".to_owned())
 }
 
 /// The program under test.
@@ -214,6 +215,14 @@ mod tests {
         assert_eq!(point("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
         for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", ""] {
             assert!(point(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_root_has_an_edge_that_is_positive() {
+        assert_eq!(root("-1,0,2,4"), Ok(Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 }));
+        for wrong in ["0,0,0,0", "0,0,0,-1", "0,0,0,inf", "0,0,0"] {
+            assert!(root(wrong).is_err(), "{wrong}");
         }
     }
 

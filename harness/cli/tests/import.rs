@@ -154,7 +154,13 @@ fn unusable_input_is_one_sentence_with_the_file() {
     assert!(refused(&["/nowhere/mesh"]).contains("/nowhere/mesh: cannot be read"));
     assert!(refused(&[empty.to_str().unwrap()]).contains("--format"));
     assert!(refused(&[bare.to_str().unwrap()]).contains("--format leaf-words"));
-    assert!(refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,-1"]).contains("is not a cube"));
+    assert!(
+        refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,-1"])
+            .contains("edge that is positive")
+    );
+    assert!(
+        refused(&[&sample("brick.csv"), "--root", "0,0,0,0"]).contains("edge that is positive")
+    );
     assert!(refused(&[&sample("brick.csv"), "--format", "p4est"]).contains("p8est"));
 }
 
