@@ -114,6 +114,7 @@ fn a_case_gives_root_and_requirements() {
         output.lines().any(|line| line.starts_with("balance") && line.contains("holds")),
         "{output}"
     );
+    assert!(output.contains("with --sides (in p4est: data)"), "{output}");
     // A file that states no inputs claims none that differ from those of the case.
     let mesh = place.path().join("mesh");
     let mesh = mesh.to_str().unwrap();

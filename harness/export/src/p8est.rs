@@ -48,10 +48,11 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         bytes
     };
     let named = |error| Failure::at(path, error);
+    let mut count = 0;
     let bytes = files::fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         out.write_all(&start(0)).map_err(named)?;
-        let (mut written, mut count) = (Written::default(), 0);
+        let mut written = Written::default();
         quadrants(export, &mut |octant, data| {
             count += 1;
             written.add(&octant, data != FILLER);
@@ -64,7 +65,9 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    Ok(Summary { leaves, bytes, notes: Vec::new() })
+    let why = "more quadrants fill the root; an import with --sides data omits them";
+    let notes = vec![format!("{} {why}", count - leaves)];
+    Ok(Summary { leaves, bytes, notes })
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.
@@ -183,8 +186,10 @@ mod tests {
                 by_part[if interleaved { i % parts } else { i / size }].push(w);
             }
             let mesh = mesh_of(by_part);
-            let (dir, _) = exported(&mesh, &Selection::default());
+            let (dir, summary) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
+            let fillers = quadrants_saved(&path) - words.len() as u64;
+            prop_assert!(summary.notes[0].starts_with(&format!("{fillers} more")), "{summary:?}");
             let set = import(&path, true);
             prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
             prop_assert_eq!(set.manifest.root, ROOT);
