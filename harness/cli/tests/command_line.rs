@@ -288,7 +288,8 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
         let fixture = Fixture::new();
         fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
         let why = ["why", "case.toml", "0,0,0", "--mesher", "./mesher"];
-        let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        let programs = ["--mesher", "./mesher", "--reference", "./mesher", "--junit", "all.xml"];
+        let verify = [&["verify", "case.toml"][..], &programs].concat();
         let shrink = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
         for arguments in [&why[..], &verify, &shrink] {
             let before = fixture.ids().len();
@@ -300,6 +301,8 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
                 panic!("{arguments:?}: {end:?}");
             }
             fixture.interrupt(run, signals);
+            let is_reported = fixture.path().join("all.xml").exists();
+            assert!(is_reported || arguments[0] != "verify" || signals.len() > 1, "{signals:?}");
         }
     }
 }

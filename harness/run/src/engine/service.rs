@@ -8,7 +8,7 @@
 use super::failure::{End, Failure, Result};
 use super::interrupt;
 use super::process::{self, Watch};
-use super::session::{Session, end_all, wait_while};
+use super::session::{Session, wait_while};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -97,7 +97,7 @@ impl Services {
         let time_s = service.answer(watch);
         let _ = service.errors.set_len(0);
         let is_usable = match &time_s {
-            // After an interrupt all services are ended at the same time: one after the other, there is no time left for a report.
+            // After an interrupt all services are ended at the same time, after the report, for which there would be no time left.
             Ok(_) | Err(End::Interrupted) => true,
             Err(End::Exited { .. }) => service.session.runs(),
             Err(_) => false,
@@ -115,7 +115,8 @@ impl Drop for Services {
         // All end at the same time.
         self.0.get_mut().values_mut().for_each(|service| drop(service.requests.take()));
         if interrupt::requested() {
-            drop(end_all());
+            // The end of the harness ends what is left, after its report.
+            std::mem::forget(std::mem::take(self.0.get_mut()));
         }
     }
 }
