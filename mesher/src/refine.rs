@@ -21,7 +21,7 @@ use crate::input::lattice::{ExtentBox, Rules, box_mask};
 use crate::partition::ownership::{Ownership, brick_start};
 use crate::record::Counters;
 use bricks::brick;
-use bricks::brickset::ones;
+use bricks::brick::ones;
 use bricks::facet::{Facet, FacetTest, crossed};
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton, start57};
 use bricks::tree::Tree;

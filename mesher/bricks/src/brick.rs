@@ -7,7 +7,6 @@
 //!   octant of level `l - 1` with code `key << 3 | j`;
 //! - levels 0 and 1 have a single brick, with key 0, of which 1 and 8 bits are used.
 
-use crate::brickset::ones;
 use crate::octant::{self, Level};
 use crate::with_avx512;
 use bytemuck::{Pod, Zeroable};
@@ -34,6 +33,18 @@ impl Brick {
     pub fn codes(self) -> impl Iterator<Item = u64> {
         ones(self.bits).map(move |bit| self.key << 6 | u64::from(bit))
     }
+}
+
+/// Positions of the set bits of `bits`, ascending.
+#[inline]
+pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        (bits != 0).then(|| {
+            let bit = bits.trailing_zeros();
+            bits &= bits - 1;
+            bit
+        })
+    })
 }
 
 /// Masks of the octants whose position along an axis is in `first..=last`, by axis, `first` and `last`.

@@ -14,6 +14,7 @@ mod parts;
 #[cfg(test)]
 pub(crate) mod tests;
 
+use crate::brick::ones;
 use crate::brick::{self, Brick};
 
 /// Bits of a key that are stored per brick.
@@ -268,18 +269,6 @@ impl FromIterator<Brick> for BrickSet {
         bricks.into_iter().for_each(|b| set.push(b.key, b.bits));
         set
     }
-}
-
-/// Positions of the set bits of `bits`, ascending.
-#[inline]
-pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
-    std::iter::from_fn(move || {
-        (bits != 0).then(|| {
-            let bit = bits.trailing_zeros();
-            bits &= bits - 1;
-            bit
-        })
-    })
 }
 
 /// The bricks of a set in order; also finds bricks by ascending keys, see [`BrickSet::cursor`].

@@ -11,7 +11,8 @@
 use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
 use bricks::brick;
-use bricks::brickset::{Cursor, ones};
+use bricks::brick::ones;
+use bricks::brickset::Cursor;
 use bricks::octant::{Level, start57};
 use bricks::tree::LEVELS;
 use bricks::widest;

@@ -14,7 +14,8 @@ mod redistribute;
 
 use crate::partition::curve::{ALL, Boundary};
 use bricks::brick::Brick;
-use bricks::brickset::{BrickSet, ones};
+use bricks::brick::ones;
+use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge, start57};
 use bricks::tree::{PerLevel, Tree};
 use std::ops::Range;

@@ -16,7 +16,8 @@
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, Placement, brick_start};
 use bricks::brick;
-use bricks::brickset::{BrickSet, ones};
+use bricks::brick::ones;
+use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree};
 use ranks::Comm;

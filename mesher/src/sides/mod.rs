@@ -290,7 +290,7 @@ mod tests {
     use crate::check;
     use crate::partition::ownership::Placement;
     use crate::tests::{rules, set, small};
-    use bricks::brickset::ones;
+    use bricks::brick::ones;
     use bricks::digest::mix;
     use bricks::octant::neighbour;
     use proptest::prelude::*;

@@ -10,8 +10,8 @@
 
 use super::masks::{Component, Masks, Part};
 use crate::partition::ownership::{Ownership, Placement};
+use bricks::brick::ones;
 use bricks::brick::{self, Block, Brick};
-use bricks::brickset::ones;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use bricks::widest;
@@ -424,7 +424,7 @@ mod tests {
     use super::*;
     use crate::sides::components;
     use crate::tests::set;
-    use bricks::brickset::ones;
+    use bricks::brick::ones;
     use bricks::wide::widths;
     use proptest::prelude::*;
     use std::collections::BTreeSet;

@@ -1,8 +1,8 @@
 //! One tile: 32 x 32 x 32 octants and a margin, one word per row.
 
 use super::{Gathered, MARGIN, TILE, TILE_BRICKS_LOG2};
+use crate::brick::ones;
 use crate::brick::{self, Brick};
-use crate::brickset::ones;
 use crate::octant::{Level, position};
 use crate::widest;
 use std::ops::Range;
