@@ -212,7 +212,7 @@ def of_json(text):
     for axis, along in enumerate(widths):
         other = along[np.abs(along - along[0]) > 1e-6 * along[0]]
         if len(other):
-            raise Refused(f"has widths {along[0]} and {other[0]} along axis {axis + 1}: an oct-tree of cubes has equal smallest cells")
+            raise Refused(f"has widths {along[0]} and {other[0]} along {'xyz'[axis]}: an oct-tree of cubes has equal smallest cells")
     shape = [len(along) for along in widths]
     root = grid(shape, origin, [along[0] for along in widths])
     wrong = np.flatnonzero(((centres < 1) | (centres >= 2 * np.array(shape))).any(axis=1))

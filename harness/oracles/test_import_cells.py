@@ -291,7 +291,7 @@ class CellsTest(unittest.TestCase):
     def test_widths_that_vary_are_an_error(self):
         for width in (b"0.25", b"0.1250005"):
             why = self.replaced("cube.json", "", b"[[0.125, 0.125", b"[[0.125, " + width)
-            self.assertIn(f"widths 0.125 and {width.decode()} along axis 1", why)
+            self.assertIn(f"widths 0.125 and {width.decode()} along x", why)
         self.assertIn("only cubes", self.replaced("cube.msh", "", b"0.125 0.125 0.125", b"0.125 0.250 0.125"))
 
 

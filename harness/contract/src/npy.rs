@@ -82,7 +82,7 @@ fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), &'static str> {
         let (value, _) = text.split_once(from)?.1.split_once(to)?;
         Some(value.trim().to_owned())
     };
-    let descr = between("'descr':", ", 'fortran_order'").zip(between("'shape': (", ")"));
+    let descr = between("'descr':", ", 'fortran_order': False,").zip(between("'shape': (", ")"));
     let (descr, shape) = descr.ok_or("it has no type or shape")?;
     let dimensions = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
     let shape = dimensions.map(|n| n.parse().map_err(|_| "its shape is not of numbers"));

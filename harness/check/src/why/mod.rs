@@ -36,9 +36,9 @@ mod gradation;
 pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth, String> {
     let geometry = Some(Geometry::of(&case.facets_lattice));
     let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
-    let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
+    let differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
     if of_mesh.sides == manifest::Sides::Unknown {
-        differing.push("the sides of the mesh are unknown".to_owned());
+        return Err("the sides of the mesh are unknown, and the answer needs them".to_owned());
     }
     if !differing.is_empty() {
         return Err(format!(

@@ -146,9 +146,9 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant> {
         let position = (corner[axis] - root.origin[axis]) / edge_of_level;
         let index = position.round();
         if (position - index).abs() > TOLERANCE {
-            let axis = axis + 1;
+            let axis = ["x", "y", "z"][axis];
             return Err(Failure::input(format_args!(
-                "is not aligned: it is {position} of its edges from the root along axis {axis}"
+                "is not aligned: it is {position} of its edges from the root along {axis}"
             )));
         }
         Failure::unless((0.0..f64::from(1u32 << level)).contains(&index), "lies outside the root")?;
