@@ -131,8 +131,7 @@ fn audit_within(most: usize, dir: &Path, case: Option<&Case>, promises: &Promise
             let mut files = CheckResult::new(checks::FILES);
             let tree = manifest.hyper_tree_grid.as_deref();
             files.examined = manifest.parts.len() as u64 + u64::from(tree.is_some());
-            let wanted = case.map_or(manifest.tree, |case| case.rules.tree);
-            if (manifest.tree, wanted) == (Kind::Base, Kind::Final) {
+            if manifest.tree == Kind::Base && case.is_some_and(|case| case.tree == Kind::Final) {
                 files.report("mesh.json states the tree \"base\": T0, which is not the final mesh");
             }
             let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
