@@ -23,7 +23,7 @@ use std::thread::{self, sleep};
 use std::time::Duration;
 
 /// Time for a command to return after a first signal.
-const GRACE: Duration = Duration::from_millis(800);
+const GRACE: Duration = Duration::from_secs(2);
 /// How often a directory is removed to which other threads may still write.
 const ATTEMPTS: usize = 20;
 
