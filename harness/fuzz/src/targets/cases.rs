@@ -51,12 +51,11 @@ const FACETS_MAX: usize = 3000;
 #[derive(Debug, PartialEq)]
 struct Meaning {
     facets: Vec<[[i64; 3]; 3]>,
-    root: [u64; 4],
-    level_surface: u32,
-    layer_cells_min: u32,
-    keep: String,
-    keep_crossing: bool,
-    enclosed: String,
+    root: ([f64; 3], f64),
+    /// The surface level and `layer_cells_min`.
+    numbers: [u32; 2],
+    /// `keep`, `keep_crossing` and `enclosed`.
+    kept: String,
     boxes: Vec<([i64; 3], [i64; 3], u32)>,
     seeds: usize,
 }
@@ -93,10 +92,6 @@ pub(super) fn case(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     mesher.is_ok()
 }
 
-fn root_bits([x, y, z]: [f64; 3], edge: f64) -> [u64; 4] {
-    [x, y, z, edge].map(f64::to_bits)
-}
-
 fn by_mesher(path: &std::path::Path) -> Result<Meaning, String> {
     let meaning = || {
         let case = case_file::read(path)?;
@@ -106,12 +101,9 @@ fn by_mesher(path: &std::path::Path) -> Result<Meaning, String> {
         let facets = rules.root.facets(slice.facets, &bounds, 0)?;
         Ok(Meaning {
             facets: facets.iter().map(|facet| facet.v.map(|v| v.map(i64::from))).collect(),
-            root: root_bits(rules.root.origin, rules.root.edge),
-            level_surface: rules.level_surface,
-            layer_cells_min: rules.layer_cells_min,
-            keep: format!("{:?}", rules.keep),
-            keep_crossing: rules.keep_crossing,
-            enclosed: format!("{:?}", rules.enclosed),
+            root: (rules.root.origin, rules.root.edge),
+            numbers: [rules.level_surface, rules.layer_cells_min],
+            kept: format!("{:?}", (rules.keep, rules.keep_crossing, rules.enclosed)),
             boxes: rules.boxes.iter().map(|b| (b.min, b.max, b.level)).collect(),
             seeds: rules.seeds.len(),
         })
@@ -123,12 +115,9 @@ fn by_reference(path: &std::path::Path) -> Result<Meaning, reference::Error> {
     let input = reference::lattice::Input::new(&reference::case_file::read(path)?)?;
     Ok(Meaning {
         facets: input.facets,
-        root: root_bits(input.root.origin, input.root.edge),
-        level_surface: input.level_surface,
-        layer_cells_min: input.layer_cells_min,
-        keep: format!("{:?}", input.keep),
-        keep_crossing: input.keep_crossing,
-        enclosed: format!("{:?}", input.enclosed),
+        root: (input.root.origin, input.root.edge),
+        numbers: [input.level_surface, input.layer_cells_min],
+        kept: format!("{:?}", (input.keep, input.keep_crossing, input.enclosed)),
         boxes: input.boxes.iter().map(|b| (b.extent.min, b.extent.max, b.level)).collect(),
         seeds: input.seeds.len(),
     })
@@ -137,12 +126,9 @@ fn by_reference(path: &std::path::Path) -> Result<Meaning, reference::Error> {
 fn by_harness(path: &std::path::Path) -> Result<Meaning, String> {
     let case = contract::case::Case::read(path).map_err(|error| error.to_string())?;
     Ok(Meaning {
-        root: root_bits(case.root.origin, case.root.edge),
-        level_surface: u32::from(case.level_surface),
-        layer_cells_min: case.layer_cells_min,
-        keep: format!("{:?}", case.keep),
-        keep_crossing: case.keep_crossing,
-        enclosed: format!("{:?}", case.enclosed),
+        root: (case.root.origin, case.root.edge),
+        numbers: [u32::from(case.level_surface), case.layer_cells_min],
+        kept: format!("{:?}", (case.keep, case.keep_crossing, case.enclosed)),
         boxes: case.boxes.iter().map(|b| (b.min, b.max, u32::from(b.level))).collect(),
         seeds: case.seeds.len(),
         facets: case.facets_lattice,
