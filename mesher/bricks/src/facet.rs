@@ -166,6 +166,7 @@ widest! {
 fn lanes(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
     let from = [0, 1, 2].map(|a| i64::from(f.facet.v[0][a]) - corner[a]);
     let mask = plane_mask(from, f.normal, shift);
+    // Not a loop, in which the half-planes pass through memory: it takes 3 % more of `refine`.
     mask & columns_met(f, corner, shift, 0)
         & columns_met(f, corner, shift, 1)
         & columns_met(f, corner, shift, 2)
