@@ -110,7 +110,8 @@ impl FacetTest {
     /// The test of facet `f`, which is prepared unless the last one was of the same facet.
     #[inline]
     fn prepared(&mut self, f: &Facet) -> &Self {
-        if self.facet != *f {
+        // Vertex by vertex, because the compiler calls a function for the comparison of all.
+        if (0..3).any(|i| self.facet.v[i] != f.v[i]) {
             *self = Self::new(f);
         }
         self

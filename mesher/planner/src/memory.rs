@@ -139,10 +139,9 @@ impl Ranks {
             *nodes.entry(rank.node).or_insert(0.0) += own;
         }
         for (rank, own) in self.all.iter().zip(more) {
-            let node = nodes[&rank.node];
             all.push(("address space", rank.address_space, own * self.in_process));
-            all.push(("control group", rank.control_group, node));
-            all.push(("machine", rank.machine, node));
+            all.push(("control group", rank.control_group, nodes[&rank.node]));
+            all.push(("machine", rank.machine, nodes[&rank.node]));
         }
         let part = |(_, left, needed): &(&str, f64, f64)| needed / left.max(1.0);
         let limited = all.into_iter().filter(|(_, left, _)| left.is_finite());

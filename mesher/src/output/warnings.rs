@@ -1,7 +1,7 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
 use crate::Mesh;
-use crate::input::lattice::{ExtentBox, Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
 use bricks::octant::ROOT_EDGE;
@@ -24,12 +24,11 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     let empty = empty_region(mesh.rules.keep, summary);
     // These two already advise to enlarge the root.
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
-    let has_effect = |b: &ExtentBox| b.meets([0; 3], ROOT_EDGE);
     let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let others = [
         (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),
         (summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
-        (!mesh.rules.boxes.iter().all(has_effect), BOXES_WITHOUT_EFFECT),
+        (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
     ];
     let Ambiguous { count, example } = summary.ambiguous;
@@ -48,10 +47,9 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
-        let is_inner = mesh.rules.keep == Keep::Inside;
         return match mesh.bounds_nothing {
             true => empty.or_else(|| Some(bounds_nothing(&mesh.rules, case_name))),
-            false => empty.filter(|_| is_inner),
+            false => empty.filter(|_| mesh.rules.keep == Keep::Inside),
         };
     };
     let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;
