@@ -1,8 +1,8 @@
 //! Repetitions of the same setup, and the statistics of each such group.
 //!
-//! Only runs of one machine, one build of the program, one network that was given, and one geometry are repetitions of each other. Those
-//! of a second machine, build or network are runs of another program, `mesher [2]`, and those of a second geometry are runs on another
-//! case, `cube [2]`.
+//! Only runs of one machine, one build of the program, one network that was given, and one case with one geometry are repetitions of each
+//! other. Those of a second machine, build or network are runs of another program, `mesher [2]`, and those of a case that was edited, or of
+//! a second geometry, are runs on another case, `cube [2]`. A run without a result is of the program and the case of its session's runs.
 //!
 //! Invariants, executed by [`Groups::check_invariants`] before anything is computed from them: a group has runs, all of its
 //! setup and with its number of cells if the mesh is the same; its time lies in its interval, and that in the range of the
@@ -17,6 +17,7 @@ use super::entry::{
 };
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
+use crate::study::file::EXPERIMENT;
 use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median, median_of};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -178,6 +179,7 @@ impl Groups {
         let (mut origins, mut meshes) = (<[Origins; 2]>::default(), Meshes::new());
         let (mut left_out, mut lacks, mut notes) = (Vec::new(), BTreeMap::new(), Vec::new());
         let mut runs: Vec<(Run, Network)> = Vec::new();
+        let mut named: Vec<(&str, &Setup, Setup)> = Vec::new();
         for line in lines {
             let session: Option<&Session> = sessions.get(&line.session).copied();
             let network = networks.get(line.session.as_str());
@@ -186,14 +188,15 @@ impl Groups {
                     lacks.extend(session.lacks.clone());
                     sessions.insert(&line.session, session);
                 }
-                Entry::LeftOut(left) => left_out.push(left.clone()),
+                Entry::LeftOut(left) => left_out.push((&line.session, left.clone())),
                 Entry::Failure(NoResult { setup, why }) => {
                     let why = format!("{} failed: {why}", setup.engine);
-                    left_out.push(NoResult { setup: setup.clone(), why });
+                    left_out.push((&line.session, NoResult { setup: setup.clone(), why }));
                 }
-                Entry::Run(run) => {
-                    let setup = apart(run, session, network, &mut origins);
-                    let run = Run { setup, ..(**run).clone() };
+                Entry::Run(as_recorded) => {
+                    let setup = apart(as_recorded, session, network, &mut origins);
+                    named.push((&line.session, &as_recorded.setup, setup.clone()));
+                    let run = Run { setup, ..(**as_recorded).clone() };
                     if run.warm_up {
                         continue;
                     }
@@ -201,7 +204,8 @@ impl Groups {
                         None => runs.push((run, network.copied().unwrap_or(ASSUMED))),
                         Some(why) => {
                             notes.push(format!("a run is left out, {}: {why}", run.setup));
-                            left_out.push(NoResult { setup: run.setup, why });
+                            let setup = as_recorded.setup.clone();
+                            left_out.push((&line.session, NoResult { setup, why }));
                         }
                     }
                 }
@@ -213,9 +217,19 @@ impl Groups {
             by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
         let of_all = |s: &Setup| (s.engine.clone(), s.case.clone());
         let has_runs: HashSet<_> = all.iter().map(|group| of_all(&group.setup)).collect();
-        let without = left_out.iter().filter(|left| all.iter().all(|g| g.setup != left.setup));
+        let as_named = |(session, NoResult { setup, why }): (&String, NoResult)| {
+            let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {
+                let last = named.iter().rfind(|(of, ran, _)| of == session && is_same(ran));
+                last.map_or(&setup, |(.., named)| named)
+            };
+            let engine = of_runs(&|ran| ran.engine == setup.engine).engine.clone();
+            let case = of_runs(&|ran| case_of(ran) == case_of(&setup)).case.clone();
+            NoResult { setup: Setup { engine, case, ..setup }, why }
+        };
+        let left_out = left_out.into_iter().map(as_named);
+        let without = left_out.filter(|left| all.iter().all(|g| g.setup != left.setup));
         notes.extend(without.map(
-            |NoResult { setup, why }| match has_runs.contains(&of_all(setup)) {
+            |NoResult { setup, why }| match has_runs.contains(&of_all(&setup)) {
                 true => format!("no run of {setup}: {why}"),
                 false => format!("{} has no run on {}: {why}", setup.engine, setup.case),
             },
@@ -387,13 +401,18 @@ fn pooled_nodes(lines: &[Line]) -> Vec<String> {
     several.map(|n| format!("runs of {n} nodes are taken for those of one machine")).collect()
 }
 
-/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network or geometry
-/// before.
+/// What the case of a run is by name: that of a series, or a mesh of targets, which may have the name of another case.
+fn case_of(Setup { experiment, case, .. }: &Setup) -> String {
+    if experiment == EXPERIMENT { format!("mesh {case}") } else { case.clone() }
+}
+
+/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network, rules or
+/// geometry before.
 fn apart(
     run: &Run,
     session: Option<&Session>,
     network: Option<&Network>,
-    [programs, geometries]: &mut [Origins; 2],
+    [programs, cases]: &mut [Origins; 2],
 ) -> Setup {
     let mut setup = run.setup.clone();
     let mut machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
@@ -402,10 +421,14 @@ fn apart(
     }
     machine += &format!("program {}", run.program);
     setup.engine += &programs.suffix(&run.setup.engine, &machine);
+    // Older runs do not state them.
+    if !run.inputs.is_empty() {
+        setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
+    }
     if let Some(digest) = &run.geometry {
-        let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
+        let Setup { case, spacing_min, layer_cells_min: n, .. } = &setup;
         let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
-        setup.case += &geometries.suffix(&mesh, digest);
+        setup.case += &cases.suffix(&mesh, digest);
     }
     setup
 }

@@ -5,7 +5,7 @@
 
 use super::file::{Row, Study};
 use super::measure::Sample;
-use crate::experiments::entry::{Entry, Line, Network, NoResult, Run};
+use crate::experiments::entry::{Entry, Line, Network, NoResult, Run, Setup};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
 use std::collections::HashMap;
@@ -44,8 +44,8 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
-/// Returns the lines of sessions on the same machine and given network as the last one, without runs of other builds of a program than in its
-/// last run.
+/// Returns the lines of sessions on the same machine and given network as the last one, without runs of other builds of a program, or with
+/// other rules or geometry of a case, than in its last run.
 pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin = |line: &Line| line.session().map(|session| session.machine.label());
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
@@ -58,9 +58,13 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
             .retain(|session| networks.iter().all(|(of, given)| of != session || given == last));
     }
     let of_sessions = || lines.iter().filter(|line| sessions.contains(&line.session.as_str()));
-    let built: HashMap<&String, &String> =
-        of_sessions().filter_map(Line::run).map(|run| (&run.setup.engine, &run.program)).collect();
-    let is_last = |run: &Run| *built[&run.setup.engine] == run.program;
+    fn made(run: &Run) -> [([&String; 2], &String); 2] {
+        let Setup { experiment, engine, case, .. } = &run.setup;
+        [([engine, engine], &run.program), ([experiment, case], &run.inputs)]
+    }
+    let last: HashMap<[&String; 2], &String> =
+        of_sessions().filter_map(Line::run).flat_map(made).collect();
+    let is_last = |run: &Run| made(run).into_iter().all(|(what, of)| last[&what] == of);
     of_sessions().filter(|line| line.run().is_none_or(is_last)).cloned().collect()
 }
 
@@ -161,7 +165,7 @@ mod tests {
     use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{Comm, Machine, Session, Setup};
+    use crate::experiments::entry::{Comm, Machine, Session};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -225,16 +229,18 @@ mod tests {
     }
 
     #[test]
-    fn each_program_has_a_last_build() {
+    fn each_program_has_a_last_build_and_each_case_its_last_rules() {
         let ran_by = |engine: &str, program: &str| {
             let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
             (run.setup.engine, run.program) = (engine.to_owned(), program.to_owned());
+            run.inputs = if program == "1" { "edited" } else { "" }.to_owned();
             line(Entry::Run(Box::new(run)))
         };
         let opened = line(Entry::Session(Box::default()));
         let (old, new, other) = (ran_by("a", "1"), ran_by("a", "2"), ran_by("b", "3"));
-        let kept = of_last_origin(&[opened.clone(), other.clone(), old, new.clone()]);
-        assert_eq!(kept, [opened, other, new]);
+        let kept = of_last_origin(&[opened.clone(), other.clone(), old.clone(), new.clone()]);
+        assert_eq!(kept, [opened.clone(), other.clone(), new]);
+        assert_eq!(of_last_origin(&[opened.clone(), other, old.clone()]), [opened, old]);
     }
 
     #[test]

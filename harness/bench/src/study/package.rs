@@ -72,17 +72,14 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<()> 
     let of_run = |run: &Run| {
         let s = &run.setup;
         let is_of = |of: &&Series| name_of(&of.experiment) == s.experiment && of.name() == s.case;
-        let (case, per_rank) = match study.series.iter().find(is_of) {
-            Some(of) => (&of.case, of.facets.map(|facets| [facets, s.ranks])),
-            None => (&study.mesh[&s.case].case, None),
-        };
-        (case, per_rank, run.inputs.clone())
+        let case = study.series.iter().find(is_of).map(|of| &of.case);
+        (case.unwrap_or_else(|| &study.mesh[&s.case].case), run.inputs.clone())
     };
     // Older runs do not state their inputs.
     let runs = last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty());
-    for (case, per_rank, inputs) in runs.map(of_run).collect::<BTreeSet<_>>() {
+    for (case, inputs) in runs.map(of_run).collect::<BTreeSet<_>>() {
         let path = paths.catalogue.case_file(case, &study.directory)?;
-        let base = Base::read(&path, per_rank, place.path())?;
+        let base = Base::read(&path, None, place.path())?;
         let why = "rules or geometry are not those of the record's runs";
         Failure::unless(base.inputs == inputs, format!("{case}: {why}"))?;
     }

@@ -212,7 +212,7 @@ impl Session<'_> {
         use Experiment::{Spacing, Strong, Weak, Weights};
         let (experiment, named) = (series.experiment, name_of(&series.experiment));
         let mut base = self.base(&series.case, None)?;
-        let of_case = [base.layer_cells_min];
+        let (of_case, inputs) = ([base.layer_cells_min], base.inputs.clone());
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
         for engine in &series.engines {
@@ -254,7 +254,7 @@ impl Session<'_> {
                         let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
                         let setup = Setup { weights, partitioner, ..of_mesh.clone() };
                         let repeats = self.options.repeats(series.repeats);
-                        let (case, inputs) = (case.clone(), base.inputs.clone());
+                        let (case, inputs) = (case.clone(), inputs.clone());
                         Planned { setup, case, inputs, repeats, warm_up: true, failed: false }
                     }));
                 }

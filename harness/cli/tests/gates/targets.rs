@@ -187,6 +187,34 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     assert!(nothing.printed.contains("mesher ended with code 70"), "{}", nothing.printed);
 }
 
+/// Facets that grow with the ranks are those of one case, and an edit of its file makes another one.
+#[test]
+fn an_edited_case_is_another_one() {
+    let fixture = scripted();
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
+    let case = "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'sphere'\nfacets = 80\n";
+    fixture.write(
+        "study.toml",
+        "[[series]]\nexperiment = 'weak'\ncase = 'ball.toml'\ncells = [1e3]\nsim = [1, 4]\nfacets = 80\n",
+    );
+    let bench = |case: &str| {
+        fixture.write("ball.toml", case);
+        fixture.harness("bench study.toml --mesher ./mesher --network 1e-6,1e10 --report out")
+    };
+    let apart = "apart: ball-80-facets-per-rank [1]: ";
+    let first = bench(case);
+    assert!(first.code == 0 && !first.printed.contains("apart: "), "{}", first.printed);
+    let second = bench(&format!("keep = 'all'\n{case}"));
+    assert!(second.code == 0 && second.printed.contains(apart), "{}", second.printed);
+    let numbers = fs::read_to_string(fixture.path("out/numbers.tex")).unwrap();
+    for ranks in [1, 4] {
+        let key = |case: &str| format!("{{mesher/{case}/weak/1000/{ranks}/projected/time}}");
+        let both = ["ball-80-facets-per-rank", "ball-80-facets-per-rank--2-"].map(key);
+        assert!(both.iter().all(|key| numbers.contains(key)), "{numbers}");
+    }
+}
+
 #[test]
 fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
     let fixture = scripted();

@@ -52,6 +52,37 @@ fn runs_of_another_machine_program_or_geometry_are_not_pooled() {
     assert!(groups.notes[0].contains("[2]: slow"), "{:?}", groups.notes);
 }
 
+/// A later session runs an edited case on another machine, where four ranks fail.
+#[test]
+fn a_run_without_a_result_is_of_the_machine_and_the_case_of_its_session() {
+    let of = |session: &str, ranks: usize, experiment: &str| {
+        let mut run = run(Comm::Sim, 9, &[("a", &vec![1.0; ranks])]);
+        run.setup.experiment = experiment.into();
+        run.inputs = format!("rules of {session}");
+        Line { session: session.into(), ..line_of(run) }
+    };
+    let mut failed = of("2", 4, "strong");
+    let setup = failed.run().unwrap().setup.clone();
+    failed.entry = Entry::Failure(NoResult { setup, why: "killed".into() });
+    let lines = [
+        of_machine("1", "slow"),
+        of("1", 1, "strong"),
+        of("1", 4, "strong"),
+        of_machine("2", "fast"),
+        failed,
+        of("2", 1, "strong"),
+        of("2", 1, EXPERIMENT),
+    ];
+    let groups = Groups::of(&lines);
+    let names: Vec<_> = groups.all.iter().map(|g| (&*g.setup.engine, &*g.setup.case)).collect();
+    let second = ("mesher [2]", "cube [2]");
+    // A mesh of targets that has the name of a case.
+    assert_eq!(names, [("mesher", "cube"), ("mesher", "cube"), second, ("mesher [2]", "cube")]);
+    assert_eq!(groups.efficiency(&groups.all[2]).global(), 1.0);
+    let [missing] = &groups.missing[..] else { panic!("{:?}", groups.missing) };
+    assert!(missing.starts_with("no run of mesher [2] cube [2] strong"), "{missing}");
+}
+
 /// The names of nodes are new in every session of a cloud, so they do not make series.
 #[test]
 fn runs_of_several_nodes_are_pooled_and_the_nodes_counted() {
