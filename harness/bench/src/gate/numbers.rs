@@ -21,6 +21,8 @@ use std::process::Command;
 
 /// The number of cells, which is known of every program.
 const CELLS: &str = "cells";
+/// The counter of the cells of every rank.
+const LEAVES: &str = "leaves";
 /// Peak memory of all ranks together.
 pub const MEMORY: &str = "peak_rss_bytes";
 /// Growth of the memory that is never reported: addresses and the sharing of pages make that much difference.
@@ -168,7 +170,7 @@ fn verdict(layer: LayerName, metric: &str, values: [u64; 2], tolerance: f64) -> 
     match () {
         () if old == new => (Verdict::Unchanged, String::new()),
         // The size of the mesh is a result, not a cost: a change is neither better nor worse.
-        () if metric == CELLS || metric.ends_with("leaves") => {
+        () if metric == CELLS || metric.ends_with(LEAVES) => {
             (Verdict::Changed, "another number of leaves".to_owned())
         }
         () if is_within && layer == LayerName::Counters => {
@@ -205,10 +207,22 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
         }
         let bytes = report.peak_rss_bytes_total();
         measures.memory.extend((bytes > 0).then(|| (format!("{prefix}{MEMORY}"), bytes)));
-        // A list without a rank counts nothing, not 0.
-        let counters = report.counters.into_iter().filter(|(_, of)| !of.is_empty());
-        let total = |(name, of): (String, Vec<u64>)| (format!("{prefix}{name}"), of.iter().sum());
-        measures.exact.extend(counters.map(total));
+        if let Some(leaves) = report.counters.get(LEAVES).filter(|of| of.len() == ranks.count()) {
+            let (sum, cells) = (leaves.iter().sum::<u64>(), report.cells);
+            if sum != cells {
+                let why = format!("counts {sum} {LEAVES}, but {cells} cells ({ranks})");
+                return Err(engine.unusable(why));
+            }
+            // The same leaves on fewer of the ranks take longer.
+            let most = leaves.iter().max().filter(|_| leaves.len() > 1);
+            measures.exact.extend(most.map(|most| (format!("{prefix}{LEAVES}_max"), *most)));
+        }
+        for (name, of) in report.counters {
+            // A list without a rank counts nothing, not 0.
+            let Some(most) = of.iter().max() else { continue };
+            let of_all = if name.ends_with("_max") { *most } else { of.iter().sum() };
+            measures.exact.insert(format!("{prefix}{name}"), of_all);
+        }
     }
     Ok(measures)
 }
