@@ -6,6 +6,8 @@ use std::fmt;
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "octree-measures/1";
+/// The working tree, by name.
+pub(crate) const WORKING_TREE: &str = ".";
 
 /// The measures of one program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,10 +27,17 @@ pub struct Measures {
 pub struct Measured {
     /// The name given by the user.
     pub named: String,
-    /// The revision it was built from.
+    /// The revision it was built from; none of a working tree with changes.
     pub revision: Option<String>,
     /// Digest of the program's files; empty if one cannot be read.
     pub program: String,
+}
+
+impl Measured {
+    /// Whether it was built from a revision or a working tree.
+    pub(crate) fn is_built(&self) -> bool {
+        self.revision.is_some() || self.named == WORKING_TREE
+    }
 }
 
 impl fmt::Display for Measured {

@@ -7,7 +7,7 @@
 //! Invariant: a directory that contains the file `built` has the result of the build command in that file, by the compiler in it.
 
 use super::GateOptions;
-use super::measures::{CaseMeasures, Measured};
+use super::measures::{CaseMeasures, Measured, WORKING_TREE};
 use crate::experiments::machine::{compiler, digest_of};
 use crate::git;
 use contract::failure::{Failure, Result};
@@ -26,9 +26,6 @@ use std::time::Duration;
 
 /// Time after which a build is killed.
 const LIMIT: Duration = Duration::from_secs(3600);
-
-/// The working tree, by name.
-const WORKING_TREE: &str = ".";
 
 /// What a layer measures of a program on a case.
 pub type Counted = Result<CaseMeasures, Ended>;
@@ -61,7 +58,7 @@ impl Subject {
         engine: &Engine,
         baseline: Option<&Self>,
     ) -> Result<Self> {
-        let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
+        let is_built = baseline.is_some_and(|subject| subject.measured.is_built());
         let own = engine.program.to_string_lossy();
         let default = if is_built && !engine.is_given { WORKING_TREE } else { &own };
         let is_one = options.candidate.is_none() || !engine.is_given;
@@ -100,8 +97,11 @@ impl Subject {
         let why = || format!("{named} is neither a file nor a revision in {shown}");
         let revision = git(repository, &arguments).ok_or_else(why)?;
         let built = (named != WORKING_TREE).then_some(revision.as_str());
+        let status = ["status", "--porcelain", "--untracked-files=no"];
+        let is_commit = built.is_some() || git(repository, &status).is_some_and(|of| of.is_empty());
         let program = program(build, built, repository)?;
-        Self::new(engine.with_program(program)?, named.to_owned(), Some(revision))
+        let revision = is_commit.then_some(revision);
+        Self::new(engine.with_program(program)?, named.to_owned(), revision)
     }
 }
 

@@ -94,9 +94,14 @@ impl Record {
     /// Returns a record of a record or report of `harness gate`: of the commit `named`, else of the revision that was measured, else of HEAD.
     ///
     /// # Errors
-    /// One sentence, if it is neither, or of another commit.
+    /// One sentence, if it is neither, of another commit, or of a working tree with changes and no commit is named.
     pub fn of_gate(text: &[u8], named: Option<&str>, repository: &Path) -> Result<Self, String> {
-        let revision = Measures::parse(text)?.of.revision;
+        let of = Measures::parse(text)?.of;
+        if named.is_none() && of.revision.is_none() && of.is_built() {
+            let why = "a working tree with changes was measured, which is no commit: measure again after committing, or give --commit";
+            return Err(why.to_owned());
+        }
+        let revision = of.revision;
         let commit = named.or(revision.as_deref()).unwrap_or("HEAD");
         let record = Self::of_commit(commit, repository)?;
         match revision.filter(|revision| *revision != record.commit) {
@@ -433,5 +438,9 @@ mod tests {
         assert!(of(&measures, None).unwrap_err().contains("git knows no commit 000"));
         assert!(of(&measures, Some("HEAD")).unwrap_err().contains("was measured"));
         assert!(Record::of_gate(b"{}", None, here).is_err());
+        // A working tree with changes is no commit, unless the user says so.
+        measures.of = Measured { named: ".".into(), ..Measured::default() };
+        assert!(of(&measures, None).unwrap_err().contains("give --commit"));
+        assert!(of(&measures, Some("HEAD")).is_ok());
     }
 }
