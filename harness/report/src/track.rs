@@ -60,9 +60,7 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     let row = |both: &(&Series, &Change)| {
         let (series, change) = *both;
         let [before, after, by] = values(series, change);
-        let sign = series
-            .is_worse(change.step.before, change.step.after)
-            .map(|worse| if worse { "worse" } else { "better" });
+        let sign = sign(series, change);
         vec![
             html! { (series.name) },
             html! { (before) },
@@ -89,6 +87,12 @@ fn values(series: &Series, change: &Change) -> [String; 3] {
     [value(change.step.before), value(change.step.after), by]
 }
 
+/// Whether a step is for the `worse` or the `better`; `None` if it is neither.
+fn sign(series: &Series, change: &Change) -> Option<&'static str> {
+    let is_worse = series.is_worse(change.step.before, change.step.after)?;
+    Some(if is_worse { "worse" } else { "better" })
+}
+
 /// All steps with their series.
 fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
     all.iter()
@@ -101,8 +105,9 @@ pub fn summary(all: &[Series]) -> String {
     let line = |series: &Series, change: &Change| {
         let [before, after, by] = values(series, change);
         let accepted = if change.accepted { ", accepted" } else { "" };
+        let sign = sign(series, change).map_or(String::new(), |sign| format!(", {sign}"));
         format!(
-            "{}: {before} -> {after} ({by}) in {}, p = {:.2e}{accepted}\n",
+            "{}: {before} -> {after} ({by}{sign}) in {}, p = {:.2e}{accepted}\n",
             series.name,
             [&change.last_old, &change.first_new].map(|commit| short_commit(commit)).join(".."),
             change.step.p

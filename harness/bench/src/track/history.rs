@@ -13,7 +13,7 @@
 //! "metrics": {"CASE/METRIC": number}, "accepted": true (absent
 //! if false)}`.
 
-use super::{is_gain, plain, unit};
+use super::{has_gain, plain, unit};
 use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::report::{GateFinding, GateReport};
@@ -183,7 +183,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         let named = |(mut name, value): (String, f64)| {
             // The others depend on the program and the case alone.
             let of_machine = [MEMORY, "memory", "time", "instructions", "allocations"];
-            if is_gain(&name) == Some(true)
+            if has_gain(&name)
                 || unit(&name) == "s"
                 || of_machine.iter().any(|of| plain(&name).contains(of))
             {

@@ -22,27 +22,34 @@ use std::collections::BTreeSet;
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
 /// Words in the names of metrics of which more is better. All others are costs.
-const GAINS: [&str; 9] = [
-    "per_s",
-    "per_second",
-    "efficiency",
-    "speed_up",
-    "speedup",
-    "throughput",
-    "rate",
-    "hold",
-    "checks",
-];
+const GAINS: &str =
+    "per_s per_sec per_second efficiency speed_up speedup throughput bandwidth load_balance hold";
+/// The same, unless it is a time.
+const RATES: &str = "rate hit_ratio checks";
+/// Beginnings of words of which less is better, whatever the other words are.
+const LOSSES: &str = "miss error fail wait";
+
+/// Whether a metric has one of these words, in small or capital letters, or a word that begins so; `end` is `_` for whole words.
+fn has(name: &str, words: &str, end: &str) -> bool {
+    let name = plain(name).to_lowercase().replace(|c: char| !c.is_alphanumeric(), "_");
+    words.split(' ').any(|word| format!("_{name}_").contains(&format!("_{word}{end}")))
+}
+
+/// Whether a metric has a word of a gain, although another one may make it a loss. Such metrics depend on the machine.
+pub(crate) fn has_gain(name: &str) -> bool {
+    has(name, GAINS, "_") || has(name, RATES, "_")
+}
 
 /// Whether more of a metric is better; `None` if it is neither better nor worse.
 pub fn is_gain(name: &str) -> Option<bool> {
-    let name = plain(name);
-    let words = |gain: &&str| format!("_{name}_").contains(&format!("_{gain}_"));
-    (!NEUTRAL.contains(&name)).then(|| GAINS.iter().any(words))
+    let is_time = has(name, "seconds time", "_") && !has(name, GAINS, "_");
+    let is_cost = is_time || has(name, LOSSES, "") || !has_gain(name);
+    (!NEUTRAL.contains(&plain(name))).then_some(!is_cost)
 }
 
-/// Number of values by which a step may be located too early or too late, and still is the change that the user accepted.
-const ACCEPTED_WITHIN: usize = 2;
+/// By how much a step may be located too early or too late, and still is the change that the user accepted: values of the metric, and
+/// commits.
+const ACCEPTED_WITHIN: [usize; 2] = [2, 10];
 
 /// One metric over the history.
 #[derive(Clone, Debug, Serialize)]
@@ -152,14 +159,16 @@ pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
     let of_discovery = |(name, points, found): (String, Vec<(usize, f64)>, Vec<Step>)| {
         let is_discovery = p_values.next() <= Some(alpha);
         let commit = |at: usize| records[points[at].0].commit.clone();
-        let change = |step: Step| Change {
+        let change = |(step, accepted): (Step, bool)| Change {
             last_old: commit(step.at - 1),
             first_new: commit(step.at),
             percent: change_percent(step.before, step.after),
-            accepted: is_accepted(step.at, &points, records),
+            accepted,
             step,
         };
-        let changes = found.into_iter().filter(|_| is_discovery).map(change).collect();
+        let accepted = are_accepted(&found, &points, records);
+        let found = found.into_iter().zip(accepted);
+        let changes = found.filter(|_| is_discovery).map(change).collect();
         let series = Series { unit: unit(&name), name, changes, points };
         series.check_invariants(records);
         series
@@ -167,11 +176,23 @@ pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
     all.into_iter().map(of_discovery).collect()
 }
 
-/// Whether a commit near a step was accepted.
-fn is_accepted(at: usize, points: &[(usize, f64)], records: &[Record]) -> bool {
-    let from = points[(at - 1).saturating_sub(ACCEPTED_WITHIN)].0 + 1;
-    let until = points[(at + ACCEPTED_WITHIN).min(points.len() - 1)].0;
-    records[from..=until].iter().any(|record| record.accepted)
+/// Returns of every step whether it was accepted. A commit that was accepted excuses one step, the nearest.
+fn are_accepted(found: &[Step], points: &[(usize, f64)], records: &[Record]) -> Vec<bool> {
+    let [values, commits] = ACCEPTED_WITHIN;
+    // The distance of a commit from those between the last old value and the first new one; `None` if it is not near.
+    let off = |at: usize, commit: usize| {
+        let first = points[(at - 1).saturating_sub(values)].0 + 1;
+        let last = points[(at + values).min(points.len() - 1)].0;
+        let [from, until] = [points[at - 1].0 + 1, points[at].0];
+        let off = from.saturating_sub(commit).max(commit.saturating_sub(until));
+        (off <= commits && (first..=last).contains(&commit)).then_some(off)
+    };
+    let mut all = vec![false; found.len()];
+    for commit in (0..records.len()).filter(|i| records[*i].accepted) {
+        let near = found.iter().zip(0..).filter_map(|(step, i)| Some((off(step.at, commit)?, i)));
+        near.min().into_iter().for_each(|(_, i): (usize, usize)| all[i] = true);
+    }
+    all
 }
 
 #[cfg(test)]
@@ -214,6 +235,12 @@ mod tests {
             "mpi-2/cells_per_second_per_core [2]",
             "speed_up",
             "hold",
+            "Speedup",
+            "parallel efficiency",
+            "load balance",
+            "hit_ratio",
+            "mcells_per_sec",
+            "checks",
         ] {
             let more = Series { name: format!("uav/{gain}"), ..all[1].clone() };
             let less = Series { name: more.name.clone(), ..better.clone() };
@@ -225,6 +252,21 @@ mod tests {
     }
 
     #[test]
+    fn what_is_missed_or_takes_time_is_no_gain() {
+        for cost in [
+            "cache_miss_rate",
+            "error_rate",
+            "rate_limit_waits",
+            "seconds_per_checks",
+            "failed_checks",
+            "load imbalance",
+            "balance_seconds",
+        ] {
+            assert_eq!(is_gain(&format!("uav/{cost}")), Some(false), "{cost}");
+        }
+    }
+
+    #[test]
     fn an_accepted_change_is_still_shown_and_no_longer_worse() {
         for (accepted, holds) in [(17, false), (18, true), (20, true), (22, true), (23, false)] {
             let mut records = sample();
@@ -232,6 +274,34 @@ mod tests {
             let all = analyse(&records, 0.01);
             assert_eq!(all[1].changes.len(), 1);
             assert_eq!(all[1].worse_recently(10).is_none(), holds, "{accepted}");
+        }
+    }
+
+    /// Two steps at commits 20 and 22; then values of every tenth commit only, with a step after that of commit 200.
+    #[test]
+    fn an_accepted_commit_excuses_the_nearest_step_alone() {
+        let left = |count: usize, every: usize, level: fn(usize) -> f64, accepted: &[usize]| {
+            let record = |i: usize| {
+                let value = level(i) + (i * 7919 % 13) as f64 / 13.0;
+                let metrics = i.is_multiple_of(every).then(|| ("c/words".to_owned(), value));
+                let metrics = metrics.into_iter().collect();
+                let accepted = accepted.contains(&i);
+                Record { metrics, accepted, ..Record::new(format!("{i:040x}")) }
+            };
+            let all = analyse(&(0..count).map(record).collect::<Vec<_>>(), 0.01);
+            let open = all[0].changes.iter().filter(|change| !change.accepted);
+            open.map(|change| change.step.at).collect::<Vec<usize>>()
+        };
+        let two = |i: usize| [1000.0, 1200.0, 1500.0][usize::from(i >= 20) + usize::from(i >= 22)];
+        assert_eq!(left(40, 1, two, &[]), [20, 22]);
+        assert_eq!(left(40, 1, two, &[20]), [22]);
+        assert_eq!(left(40, 1, two, &[21]), [22], "one of them");
+        assert_eq!(left(40, 1, two, &[23]), [20]);
+        assert_eq!(left(40, 1, two, &[20, 22]), [0; 0]);
+        let rare = |i: usize| if i <= 200 { 1000.0 } else { 1100.0 };
+        for (accepted, open) in [(180, true), (191, false), (205, false), (220, false), (221, true)]
+        {
+            assert_eq!(left(400, 10, rare, &[accepted]).is_empty(), !open, "{accepted}");
         }
     }
 

@@ -24,10 +24,11 @@ pub struct Arguments {
     /// Also append this value; may be repeated
     #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
     value: Vec<(String, f64)>,
-    /// The commit of the appended values [default: that of the file, or HEAD]
+    /// The commit of the appended values [default: that of the file, or HEAD; none for a working tree with changes]
     #[arg(long, value_name = "REVISION")]
     commit: Option<String>,
-    /// Accept the changes of all metrics at this commit of the history, so that they no longer fail; may be repeated
+    /// Accept the change of every metric at this commit of the history, or the nearest within two values and ten commits, so that it no
+    /// longer fails; may be repeated
     #[arg(long, value_name = "COMMIT")]
     accept: Vec<String>,
     /// The repository that the commit is in [default: that of the current directory]
@@ -130,7 +131,10 @@ fn append(arguments: &Arguments) -> Result<()> {
         let of_commit = Record::of_commit(commit.unwrap_or("HEAD"), repository)?;
         records.push(Record { machine, ..of_commit });
     }
-    records.last_mut().expect("a record").metrics.extend(arguments.value.iter().cloned());
+    for (name, value) in &arguments.value {
+        let before = records.last_mut().expect("a record").metrics.insert(name.clone(), *value);
+        Failure::unless(before.is_none(), format!("{name} has two values: give one of them"))?;
+    }
     records.retain(|record| !record.metrics.is_empty());
     if records.is_empty() {
         let why = "nothing was measured, so nothing is appended: no file of --add has a metric";

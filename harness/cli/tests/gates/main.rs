@@ -142,6 +142,35 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     );
 }
 
+/// A program that counts leaves: all of them on rank 0, or none.
+#[test]
+fn leaves_are_those_of_the_mesh_and_the_rank_with_most_of_them_counts() {
+    let fixture = Fixture::new();
+    let script = fs::read_to_string(fixture.path("engine")).unwrap();
+    let with = |name: &str, cells: u64, [serial, two]: [&str; 2]| {
+        let of = format!(
+            "[ \"$ranks\" = 1 ] && leaves={serial} || leaves={two}\ncells={cells}\n[ -z \"$out\" ]"
+        );
+        let text = script.replacen("[ -z \"$out\" ]", &of, 1);
+        let counted = "\"counters\": {\"rank_words_max\": [%s], \"leaves\": [%s], \"words\"";
+        let text = text.replace("\"counters\": {\"words\"", counted);
+        let values = "\"$leaves\" \"$leaves\" \"$(grep -c outer";
+        fixture.program(name, &text.replace("\"$(grep -c outer", values));
+    };
+    with("even", 8, ["8", "4,4"]);
+    with("uneven", 8, ["8", "8,0"]);
+    with("none", 8, ["0", "0,0"]);
+    let gate = "gate --engine engine.toml --rules gate.toml --layers counters --baseline even";
+    let outcome = fixture.harness(&format!("{gate} --candidate uneven"));
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    for part in ["2 ranks/leaves_max 4 -> 8", "2 ranks/rank_words_max 4 -> 8"] {
+        assert!(outcome.printed.contains(part), "{}", outcome.printed);
+    }
+    let none = fixture.harness(&format!("{gate} --candidate none"));
+    let why = "counts 0 leaves, but 8 cells";
+    assert!(none.code == 1 && none.printed.contains(why), "{}", none.printed);
+}
+
 #[test]
 fn incomparable_baselines_are_reported() {
     let fixture = Fixture::new();
@@ -202,10 +231,14 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     let forms = "--page trend.html --json trend.json --junit t.xml";
     let outcome = fixture.harness(&format!("track history.jsonl --fail-recent 6 {forms}"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
-    assert!(outcome.printed.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", outcome.printed);
+    assert!(
+        outcome.printed.contains("case/words: 40 -> 44 (+10.00 %, worse) in "),
+        "{}",
+        outcome.printed
+    );
     let named = "FAILED: worse within the last 6 values: case/words";
     assert!(outcome.printed.contains(named), "{}", outcome.printed);
-    for wrong in ["words=1", "case/words=1e200", "case/words=nan"] {
+    for wrong in ["words=1", "case/words=1e200", "case/words=nan", "case/x=5 --value case/x=7"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
     }
     let series = fs::read_to_string(fixture.path("trend.json")).unwrap();
@@ -264,10 +297,19 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
         ("--baseline HEAD~1 --candidate HEAD", "words 40 -> 41"),
         ("--baseline HEAD", "words 41 -> 43"),
     ] {
-        let outcome = fixture.harness(&format!("{gate} {revisions}"));
+        let outcome = fixture.harness(&format!("{gate} {revisions} --record of.json"));
         assert_eq!(outcome.code, 1, "{}", outcome.printed);
         assert!(outcome.printed.contains(change), "{}", outcome.printed);
     }
+    // The last one is of a working tree that is no commit.
+    let track = "track history.jsonl --repository other/ --add of.json";
+    let refused = fixture.harness(track);
+    assert!(refused.code == 2 && refused.printed.contains("give --commit"), "{}", refused.printed);
+    assert_eq!(fixture.harness(&format!("{track} --commit HEAD")).code, 0);
+    git("stash --quiet");
+    let clean = fixture.harness(&format!("{gate} --baseline HEAD --record of.json"));
+    assert_eq!((clean.code, fixture.harness(track).code), (0, 0), "{}", clean.printed);
+    git("stash pop --quiet");
     fixture.program("given", program);
     fixture.write("words", "47");
     let given = fixture.harness(&format!("{gate} --baseline HEAD~1 --mesher given"));
