@@ -1,7 +1,7 @@
 //! A report from a record of every experiment: its files, its trend, its page.
 
 use bench::experiments::entry::{
-    Comm, Entry, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread,
+    ASSUMED, Comm, Entry, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread,
 };
 use report::benchmark::report;
 use std::path::Path;
@@ -94,7 +94,8 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
 }
 
 fn record() -> Vec<Line> {
-    let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
+    let network =
+        Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true, ..ASSUMED };
     let mut lines = vec![session(), line(Entry::Network(network))];
     for ranks in [1, 2, 4, 16, 32, 64] {
         lines.extend(run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));

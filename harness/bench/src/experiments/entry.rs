@@ -133,11 +133,14 @@ pub struct Network {
     pub bandwidth_bytes_per_s: f64,
     /// Whether a ping-pong measured them; otherwise the user gave them, or they are [`ASSUMED`].
     pub measured: bool,
+    /// Whether the user gave them. Older records do not say it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub given: bool,
 }
 
 /// The default: a current cluster interconnect.
 pub const ASSUMED: Network =
-    Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
+    Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false, given: false };
 
 impl Network {
     /// Whether the times of an empty message, and of one more byte, are those that a clock can show.
@@ -364,7 +367,7 @@ pub struct Run {
 
 impl Run {
     /// Whether it has ranks, at most a million, of which all values are stored, or none; a wall time, which is at most that of the launcher
-    /// and at least that of any phase; times that a clock can show; and sums that are those of the ranks and of the phases.
+    /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and sums that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
@@ -378,7 +381,9 @@ impl Run {
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
         let off = rounding(setup.ranks * phases.len(), total);
         let slowest = phases.iter().map(|phase| phase.wall_s.max).fold(0.0, f64::max);
+        let useful = phases.iter().map(|phase| phase.useful_s.max).reduce(f64::max);
         (1..=1_000_000).contains(&setup.ranks)
+            && (setup.comm != Comm::Sim || useful.unwrap_or(useful_s.max) > 0.0)
             && *time_wall_s > 0.0
             && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
             && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)
@@ -442,7 +447,8 @@ mod tests {
 
     #[test]
     fn a_line_has_its_kind_and_is_read_back_unchanged() {
-        let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
+        let network =
+            Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true, ..ASSUMED };
         let line = Line {
             schema: SCHEMA.into(),
             session: "s".into(),
@@ -455,7 +461,7 @@ mod tests {
     }
 
     fn network(latency_s: f64) -> Entry {
-        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, ..ASSUMED })
     }
 
     fn append(path: &Path, latency_s: f64) {

@@ -63,7 +63,7 @@ fn parse(text: &str) -> Result<Network, String> {
     let points: Vec<[f64; 2]> = points.collect();
     if let [[small, latency_s], .., [large, time_s]] = points[..] {
         let bandwidth_bytes_per_s = (large - small) / (time_s - latency_s);
-        let network = Network { latency_s, bandwidth_bytes_per_s, measured: true };
+        let network = Network { latency_s, bandwidth_bytes_per_s, measured: true, ..ASSUMED };
         let is_near =
             |[bytes, s]: &[f64; 2]| (0.125..8.0).contains(&(s / network.time_s(1.0, *bytes)));
         let grow = points.is_sorted_by(|a, b| a[0] < b[0] && 0.7 * a[1] < b[1]);
@@ -83,7 +83,7 @@ pub fn given(text: &str) -> Result<Network, String> {
     let values = numbers.collect::<Result<Vec<f64>, _>>().unwrap_or_default();
     let why = "give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10";
     let [latency_s, bandwidth_bytes_per_s] = values[..] else { return Err(why.to_owned()) };
-    let network = Network { latency_s, bandwidth_bytes_per_s, measured: false };
+    let network = Network { latency_s, bandwidth_bytes_per_s, measured: false, given: true };
     if network.is_possible() { Ok(network) } else { Err(why.to_owned()) }
 }
 
@@ -116,6 +116,10 @@ mod tests {
     #[test]
     fn a_given_network_is_parsed() {
         assert_eq!(given("1e-6, 2e9").unwrap().bandwidth_bytes_per_s, 2e9);
+        // One that is as good as the assumed one is given all the same.
+        let same = given("2e-6,1e10").unwrap();
+        assert!(same.is_given() && same.to_string().ends_with("(given)"), "{same}");
+        assert!(!ASSUMED.is_given() && ASSUMED.to_string().ends_with("(assumed)"));
         assert!(given("1e-6").is_err() && given("1,0").is_err());
     }
 }

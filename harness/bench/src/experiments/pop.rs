@@ -209,10 +209,11 @@ pub fn heaviest_base_leaf(run: &Run) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiments::entry::ASSUMED;
     use crate::testing::run;
     use proptest::prelude::*;
 
-    const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: false };
+    const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, ..ASSUMED };
 
     fn close(a: f64, b: f64) {
         assert!((a - b).abs() < 1e-9, "{a} is not {b}");
@@ -234,7 +235,7 @@ mod tests {
         // Two messages of half a second each, and 3 bytes at one byte a second.
         two.phases[1].messages = Spread::of(&[2.0, 0.0]);
         two.phases[1].message_bytes = Spread::of(&[0.0, 3.0]);
-        let slow = Network { latency_s: 0.5, bandwidth_bytes_per_s: 1.0, measured: false };
+        let slow = Network { latency_s: 0.5, bandwidth_bytes_per_s: 1.0, ..ASSUMED };
         close(time_s(&two, &slow), 6.0 + 1.0 + 3.0);
         close(efficiency(&two, &one, &slow).transfer, 0.6);
     }
@@ -334,7 +335,7 @@ mod tests {
         let mut fine = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[2.0, 2.0])]);
         assert!(cause(&fine, &one, &FREE).contains("no single cause"));
         fine.phases[1].messages = Spread::of(&[10.0, 10.0]);
-        let slow = Network { latency_s: 0.1, bandwidth_bytes_per_s: 1e9, measured: false };
+        let slow = Network { latency_s: 0.1, bandwidth_bytes_per_s: 1e9, ..ASSUMED };
         assert!(cause(&fine, &one, &slow).contains("messages take time"));
 
         let redundant = run(Comm::Sim, 100, &[("read", &[2.05, 2.05]), ("grade", &[2.0, 2.0])]);

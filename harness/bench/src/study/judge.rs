@@ -51,7 +51,7 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let mut sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
-    let given = |(session, network)| (session, Some(network).filter(Network::is_given));
+    let given = |(session, of): (_, Network)| (session, of.is_given().then(|| of.to_string()));
     let networks: Vec<_> = lines.iter().filter_map(Line::network).map(given).collect();
     if let Some((_, last)) = networks.iter().rfind(|(session, _)| sessions.contains(session)) {
         sessions
@@ -165,7 +165,7 @@ mod tests {
     use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{Comm, Machine, Session};
+    use crate::experiments::entry::{ASSUMED, Comm, Machine, Session};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -248,7 +248,12 @@ mod tests {
         let of = |name: &str, entry: Entry| Line { session: name.into(), ..line(entry) };
         let opening = || Entry::Session(Box::default());
         let network = |measured: bool| {
-            Entry::Network(Network { latency_s: 1.0, bandwidth_bytes_per_s: 1e9, measured })
+            Entry::Network(Network {
+                latency_s: 1.0,
+                bandwidth_bytes_per_s: 1e9,
+                measured,
+                ..ASSUMED
+            })
         };
         let lines = [
             of("a", opening()),

@@ -180,12 +180,13 @@ fn share(sample: &Sample) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Entry, Network, Run, Spread};
+    use crate::experiments::entry::{ASSUMED, Comm, Entry, Network, Run, Spread};
     use crate::experiments::group::Groups;
     use crate::testing::line;
     use crate::testing::run;
 
-    const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true };
+    const FREE: Network =
+        Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true, ..ASSUMED };
 
     fn group(run: Run) -> Group {
         let lines = [line(Entry::Network(FREE)), line(Entry::Run(Box::new(run)))];

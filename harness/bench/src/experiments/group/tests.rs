@@ -9,7 +9,12 @@ fn line_of(run: Run) -> Line {
 }
 
 fn free() -> Line {
-    line(Entry::Network(Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true }))
+    line(Entry::Network(Network {
+        latency_s: 0.0,
+        bandwidth_bytes_per_s: 1e30,
+        measured: true,
+        ..ASSUMED
+    }))
 }
 
 fn of_machine(session: &str, cpu: &str) -> Line {
@@ -143,7 +148,7 @@ fn a_program_without_any_run_on_a_case_is_named() {
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
     let network = |latency_s: f64, measured: bool| {
-        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e30, measured })
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e30, measured, ..ASSUMED })
     };
     let mut sim = run(Comm::Sim, 9, &[("a", &[1.0, 1.0])]);
     sim.phases[0].messages = Spread::of(&[1.0, 1.0]);
@@ -209,7 +214,7 @@ fn a_sum_that_is_not_that_of_the_ranks_is_noticed() {
 /// Two sessions on two machines, each with its network; and one run that has another mesh.
 #[test]
 fn a_projection_has_the_network_of_its_machine_and_a_run_with_another_mesh_is_left_out() {
-    let slow = Network { latency_s: 1.0, bandwidth_bytes_per_s: 1e30, measured: true };
+    let slow = Network { latency_s: 1.0, bandwidth_bytes_per_s: 1e30, measured: true, ..ASSUMED };
     let of_machine = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
     let session = |cpu: &str| {
         let machine = Machine { cpu: cpu.into(), ..Machine::default() };
@@ -264,7 +269,14 @@ fn impossible_numbers_of_a_line_are_noticed() {
         |run| run.cells = 0,
     ];
     assert!(!faults.into_iter().any(is_possible));
-    let network = Network { latency_s: -1.0, bandwidth_bytes_per_s: 1.0, measured: true };
+    // Nothing could be projected from it.
+    let mut idle = run(Comm::Sim, 9, &[("a", &[0.0, 0.0])]);
+    (idle.time_wall_s, idle.time_launch_s) = (1.0, 1.0);
+    assert!(!line_of(idle.clone()).is_possible());
+    idle.setup.comm = Comm::Mpi;
+    assert!(line_of(idle).is_possible());
+    let network =
+        Network { latency_s: -1.0, bandwidth_bytes_per_s: 1.0, measured: true, ..ASSUMED };
     assert!(!line(Entry::Network(network)).is_possible());
 }
 
