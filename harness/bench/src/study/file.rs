@@ -305,12 +305,18 @@ impl Study {
         let wrong_against = against != row.against.is_some();
         let least = if input == Input::Series { 2 } else { 1 };
         let needs = |needs: bool| if needs { "requires" } else { "does not accept" };
+        let is_sim = |name: &String| self.run[name].comm == Comm::Sim;
+        let is_of_several = matches!(input, Input::Series | Input::Against);
+        // Ranks in one process have projected times, and share their memory. Their cells are those of any ranks.
+        let is_mixed = is_of_several && name != "lambda_cells_ratio";
+        let is_mixed = is_mixed && row.runs().any(is_sim) && !row.runs().all(is_sim);
         let (least_value, most) = (row.at_least.unwrap_or(0.0), row.at_most.unwrap_or(f64::MAX));
         let is_range = least_value.is_finite() && most.is_finite() && least_value <= most;
         refuse(&[
             (!is_range, "at_least and at_most are finite, and at_least is not more"),
             (wrong_against, &format!("{name} {} a run in `against`", needs(against))),
             (phase == row.phase.is_empty(), &format!("{name} {} a name in `phase`", needs(phase))),
+            (is_mixed, &format!("{name} compares simulated ranks with other ranks")),
             (row.run.len() < least, &format!("{name} requires {least} or more runs")),
         ])
     }

@@ -9,7 +9,7 @@ const FILE: &str = r#"
     case = "cube-small"
     spacing_min = 0.1
     [run]
-    one = { mesh = "cube", repeats = 3 }
+    one = { mesh = "cube", repeats = 3, comm = "sim" }
     two = { mesh = "cube", ranks = 2, comm = "sim", weights = "area" }
     [[row]]
     name = "rate"
@@ -140,6 +140,7 @@ fn contradictions_are_reported() {
         ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
         ("against = \"one\"", "", "\"speed-up\": speed_up requires a run in `against`"),
         ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
+        (", comm = \"sim\" }", " }", "\"speed-up\": speed_up compares simulated ranks with other"),
         ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
         ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
         ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
@@ -154,6 +155,9 @@ fn contradictions_are_reported() {
         let found = read(&FILE.replacen(from, to, 1)).unwrap_err();
         assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
     }
+    let (without_series, _) = FILE.split_once("[[row]]\n    name = \"growth\"").unwrap();
+    let mixed = without_series.replacen(", comm = \"sim\" }", " }", 1);
+    assert!(read(&mixed.replace("\"speed_up\"", "\"lambda_cells_ratio\"")).is_ok());
     assert!(read("").unwrap_err().contains("no [[series]] and no [[row]]"));
 }
 
