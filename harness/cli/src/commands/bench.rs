@@ -1,9 +1,10 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
 use crate::output::{put, unwritten};
-use bench::experiments::entry::{Entry, Line, NoResult, Run};
+use bench::experiments::entry::{Entry, Line, NoResult, Setup};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
+use bench::study::file::EXPERIMENT;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
 use clap::Args;
@@ -97,6 +98,11 @@ fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8>
         files::check_writable(&directory.join(PAGE))?;
     }
     let outcome = execute(&arguments.session, record, &mut study, &arguments.programs)?;
+    if outcome.interrupted && !outcome.lines.iter().any(is_result) {
+        // There is nothing to tabulate or to report.
+        print_without(&outcome.lines);
+        return Err(Failure::interrupted());
+    }
     let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", record.display());
     if outcome.interrupted {
@@ -205,20 +211,29 @@ fn markdown(table: &Table, machine: &str) -> String {
     format!("# Targets\n\n{machine}\n\n{counts}\n\n{}", table.markdown())
 }
 
-/// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program.
+fn is_result(line: &Line) -> bool {
+    line.run().is_some_and(|run| !run.warm_up)
+}
+
+/// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program
+/// in an experiment on a case.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
-    let runs: Vec<&Run> = lines.iter().filter_map(Line::run).filter(|run| !run.warm_up).collect();
+    fn of_series(setup: &Setup) -> [&str; 3] {
+        [&setup.engine, &setup.experiment, &setup.case]
+    }
+    let results = lines.iter().filter(|line| is_result(line)).filter_map(Line::run);
+    let runs: HashSet<_> = results.map(|run| of_series(&run.setup)).collect();
     let mut left_out = lines.iter().filter_map(|line| match &line.entry {
-        Entry::LeftOut(left) => Some(&left.setup.engine),
+        // A row says itself that it was left out.
+        Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != EXPERIMENT),
         _ => None,
     });
-    let has_none = |name: &&String| runs.iter().all(|run| run.setup.engine != **name);
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let without = left_out.find(has_none).filter(|_| !study.series.is_empty());
+    let without = left_out.find(|of| !runs.contains(of));
     let why = match study.series.is_empty() {
         true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured".to_owned(),
         false if runs.is_empty() => {
@@ -226,7 +241,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
                 .to_owned()
         }
         _ => match without {
-            Some(name) => format!("nothing was measured of {name}: the report says why"),
+            Some(of) => format!("nothing was measured of {}: the report says why", of.join(", ")),
             None => return EXIT_HOLDS,
         },
     };
@@ -237,7 +252,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::Comm;
+    use bench::experiments::entry::{Comm, Run};
     use bench::study::judge::unjudged;
     use bench::testing::{line, run, study as read};
 
@@ -258,6 +273,14 @@ mod tests {
         let all = [mesher, warm_up, left, other];
         assert_eq!(code(&study, &[], &all[..3]), EXIT_MISSING);
         assert_eq!(code(&study, &[], &all), EXIT_HOLDS);
+        // What it does in one experiment does not make up for another one.
+        let [mut weak, mut of_row] = [all[2].clone(), all[2].clone()];
+        for (line, experiment) in [(&mut weak, "weak"), (&mut of_row, EXPERIMENT)] {
+            let Entry::LeftOut(left) = &mut line.entry else { panic!("{line:?}") };
+            left.setup.experiment = experiment.into();
+        }
+        assert_eq!(code(&study, &[], &[&all[..], &[weak]].concat()), EXIT_MISSING);
+        assert_eq!(code(&study, &[], &[&all[..], &[of_row]].concat()), EXIT_HOLDS);
     }
 
     #[test]

@@ -243,6 +243,18 @@ fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
     assert!(outcome.printed.contains("MISSED"), "{}", outcome.printed);
 }
 
+/// A report of no run would say nothing.
+#[test]
+fn an_interruption_before_the_first_run_leaves_no_report() {
+    let fixture = scripted();
+    fixture.program("mesher", "#!/bin/sh\nkill -INT $PPID\nsleep 60\n");
+    fixture.write("study.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\n");
+    let outcome = fixture.harness("bench study.toml --mesher ./mesher --no-mpi --report out");
+    assert_eq!(outcome.code, 130, "{}", outcome.printed);
+    assert!(!outcome.printed.contains("nothing was measured"), "{}", outcome.printed);
+    assert!(!fixture.path("out/index.html").exists());
+}
+
 #[test]
 fn rows_that_were_all_left_out_and_a_partition_without_metis_are_not_green() {
     let fixture = scripted();
