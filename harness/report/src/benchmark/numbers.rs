@@ -98,12 +98,12 @@ pub fn tex(numbers: &[Number]) -> String {
 }
 
 /// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths. A bracket after
-/// the first commands begins an interval.
+/// the first commands begins an interval or a short title. Before a word, `in` is one as well.
 const NOT_READ: [&str; 4] = [
-    r"\\(?:left|in|[bB]igg?l?)\b",
+    r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
     r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
-    r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
+    r"[0-9.]+(?:(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
 
 /// Digits with points, thousands separators, and a power of ten.
@@ -162,8 +162,9 @@ pub fn included(text: &str) -> Vec<String> {
     names.filter(|name: &String| !name.starts_with(r"\figures/")).collect()
 }
 
+/// In an address, `%` begins no comment.
 fn without_comments(text: &str) -> String {
-    without(r"(?m)%.*$", &without(r"\\[\\%]", text))
+    without(r"(?m)%.*$", &without(r"\\(?:[\\%]|(?:url|href|path)\s*\{[^}\n]*\})", text))
 }
 
 fn pattern(text: &str) -> Regex {
@@ -291,7 +292,7 @@ mod tests {
         let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
         let findings = |text: &str| check(text, &record).findings;
         let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, $1.23\\times10^0$ or 0.123e1 s, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
-                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\
+                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\\\\[1.25in] \\vskip 1.25in\n\\href{http://x/1.999%20b}{b}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
         assert_eq!(check(right, &record), Checked { compared: 9, by_hand: 6, findings: vec![] });
         for (text, part) in [
@@ -314,6 +315,11 @@ mod tests {
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
+            ("\\url{http://x/a%20b} 9.87", "9.87 is written by hand"),
+            ("\\caption[short 9.87]{a}", "9.87 is written by hand"),
+            ("\\subsection*[9.87]{a}", "9.87 is written by hand"),
+            ("9.87exactly", "9.87 is written by hand"),
+            ("9.87in total", "9.87 is written by hand"),
             ("a factor of .987", ".987 is written by hand"),
             ("\\result[intervall]{a/time}", "no option intervall"),
             ("\\result[interval]{a/speedup}", "a/speedup has no interval"),
