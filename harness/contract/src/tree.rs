@@ -133,6 +133,14 @@ impl Tree {
         self.children.len()
     }
 
+    /// The contents of the children of a node.
+    ///
+    /// # Panics
+    /// If it is none.
+    pub fn children(&self, of: Handle) -> [Handle; 8] {
+        self.children[of.index()]
+    }
+
     /// The content of a child of an octant with content `of` at this level.
     #[inline]
     pub fn child(&self, of: Handle, digit: u8, level: u8) -> Handle {

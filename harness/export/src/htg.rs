@@ -1,8 +1,8 @@
 //! Selected leaves as a hyper-tree grid in VTKHDF: the whole tree in one file, a twentieth of a byte per leaf. Leaves that are not
 //! selected are masked.
 //!
-//! The file has the nodes level by level, and the leaves come in Morton order. So the nodes of all levels are in memory first, in families of eight
-//! siblings of half a byte per node: about 1.2 bytes per leaf while they are put in the order of the file.
+//! The file has the nodes level by level, and the leaves come in Morton order. So they become a tree that stores equal subtrees once, whose
+//! split nodes are then put in the order of the file: about 1.2 bytes per leaf.
 
 use std::io::BufWriter;
 use std::path::Path;
@@ -10,8 +10,7 @@ use std::path::Path;
 use contract::failure::{Failure, Result};
 use contract::files;
 use contract::lattice::Root;
-use contract::mesh::Leaf;
-use contract::octant::LEVEL_MAX;
+use contract::tree::{Builder, Handle, Kind, Tree};
 use contract::word::{self, Side};
 use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window, groups};
 use vtkhdf::write::Deflater;
@@ -26,19 +25,18 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let Export { mesh, options, .. } = export;
     mesh.require_sides()?;
     let leaves = export.count()?;
-    let mut families = Families::default();
+    let mut builder = Builder::default();
     export.visit(&mut |leaf| {
-        families.push(&leaf);
+        builder.push_leaf(word::key_of(leaf.octant.corner), leaf.octant.level, leaf.side as Kind);
         Ok(())
     })?;
+    let tree = builder.finish();
     let Root { origin, edge } = mesh.manifest.root;
-    let below_root = families.levels[1..].iter().map(|level| 8 * level.len() as u64);
-    let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };
-    // The root, then the groups of siblings as the file numbers them.
-    let families = families.levels.concat();
-    let shown = |[split, deleted, ..]: &[u8; 4]| u64::from((split | deleted).count_zeros());
-    let shown: u64 = families.iter().map(shown).sum();
-    assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
+    let (nodes, split) = by_level(&tree);
+    let shape = Shape { origin, edge, nodes };
+    let children = split.iter().flat_map(|&node| tree.children(node));
+    let shown = children.chain([tree.root()]).filter(|content| content.as_leaf().is_some());
+    assert_eq!(shown.count() as u64, leaves, "nodes that are neither split nor masked, and leaves");
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
         let out = BufWriter::with_capacity(1 << 20, file);
@@ -48,10 +46,10 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
             options.check()?;
             let mut window = Window::new(index);
             if index == 0 {
-                window.put_root(siblings(families[0]));
+                window.put_root(siblings(&[tree.root()]));
             }
-            for group in groups(index).take_while(|&group| group + 1 < families.len() as u64) {
-                window.put(group, siblings(families[group as usize + 1]));
+            for group in groups(index).take_while(|&group| group < split.len() as u64) {
+                window.put(group, siblings(&tree.children(split[group as usize])));
             }
             out.add(index, &window.compress(&shape, &mut deflater)).map_err(named)?;
         }
@@ -60,50 +58,29 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
-/// Eight siblings of four bytes instead of four words.
-fn siblings(family: [u8; 4]) -> Siblings {
-    let [split, deleted, crossing, inside] = family.map(u64::from);
-    Siblings { split, deleted, crossing, inside }
-}
-
-/// Families of siblings, level by level, each as the bits split, deleted, crossing and inside; level 0 has the root in place of the first of its family.
-#[derive(Debug, Default)]
-struct Families {
-    levels: Vec<Vec<[u8; 4]>>,
-    /// Morton code of the last leaf. Its family and those of the octants that contain it are the last ones of their levels.
-    key: u64,
-}
-
-impl Families {
-    /// Adds a leaf, which follows the last one.
-    fn push(&mut self, leaf: &Leaf) {
-        let (key, level) = (word::key_of(leaf.octant.corner), usize::from(leaf.octant.level));
-        // The first octants that differ from those of the last leaf are siblings. Below them, families are new.
-        let differ = (self.key ^ key).checked_ilog2().map_or(0, |bit| LEVEL_MAX - bit as u8 / 3);
-        let new = if self.levels.is_empty() { 0 } else { usize::from(differ) + 1 };
-        self.key = key;
-        self.levels.resize_with(self.levels.len().max(level + 1), Vec::new);
-        for level in new..=level {
-            self.levels[level].push([0, 0xff, 0, 0]);
-        }
-        for level in new.saturating_sub(1)..level {
-            let ([split, deleted, ..], bit) = self.last(level, key);
-            *split |= bit;
-            *deleted &= !bit;
-        }
-        let ([_, deleted, crossing, inside], bit) = self.last(level, key);
-        *deleted &= !bit;
-        match leaf.side {
-            Side::Crossing => *crossing |= bit,
-            Side::Inside => *inside |= bit,
-            Side::Outside => {}
-        }
+/// The numbers of nodes by level, and the split nodes as the file numbers them: the children of each are one group of siblings.
+fn by_level(tree: &Tree) -> (Vec<u64>, Vec<Handle>) {
+    let is_split = |of: &Handle| of.is_node();
+    let mut level: Vec<Handle> = [tree.root()].into_iter().filter(is_split).collect();
+    let (mut nodes, mut split) = (vec![1], Vec::new());
+    while !level.is_empty() {
+        nodes.push(8 * level.len() as u64);
+        split.extend_from_slice(&level);
+        level = level.iter().flat_map(|&node| tree.children(node)).filter(is_split).collect();
     }
+    (nodes, split)
+}
 
-    /// The last family of a level, and the bit of the octant in it that contains a level-19 cell.
-    fn last(&mut self, level: usize, key: u64) -> (&mut [u8; 4], u8) {
-        let digit = if level == 0 { 0 } else { (key / word::span(level as u8)) & 7 };
-        let family = self.levels[level].last_mut().expect("families are added from the root on");
-        (family, 1 << digit)
+/// Siblings, or the root, with these contents.
+fn siblings(contents: &[Handle]) -> Siblings {
+    let bits = |has: &dyn Fn(Handle) -> bool| {
+        (0..).zip(contents).map(|(i, &content)| u64::from(has(content)) << i).sum()
+    };
+    let of = |side: Side| bits(&|content| content.as_leaf() == Some(side as Kind));
+    Siblings {
+        split: bits(&Handle::is_node),
+        deleted: bits(&|content| content == Handle::HOLE),
+        crossing: of(Side::Crossing),
+        inside: of(Side::Inside),
     }
 }
