@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 
 use crate::htg::Block;
@@ -40,7 +41,7 @@ const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The sum of [`mix`] of all words. The two parts of the low halves are summed separately, so that the loop needs no carry, and of so few words at
 /// once that they cannot overflow.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512dq"))]
 fn sum_of(block: &Block) -> u128 {
     let (mut sum, count, step) = (0u128, block.leaves().min(1 << 30), block.step());
     for begin in (0..block.leaves()).step_by(1 << 30) {
@@ -60,12 +61,9 @@ fn sum_of(block: &Block) -> u128 {
 impl Digest {
     /// The digest of a geometry: that of one word per facet.
     pub fn of_facets(facets: &[FacetLattice]) -> Self {
-        let mut digest = Self::default();
-        for facet in facets {
-            let step = |w: u64, &c: &i64| finalise((w ^ c as u64).wrapping_add(INCREMENT));
-            digest.add(facet.as_flattened().iter().fold(0, step));
-        }
-        digest
+        let step = |w: u64, &c: &i64| finalise((w ^ c as u64).wrapping_add(INCREMENT));
+        let word = |facet: &FacetLattice| facet.as_flattened().iter().fold(0, step);
+        Self::of(&facets.iter().map(word).collect::<Vec<u64>>())
     }
 
     /// The digest of these words.
@@ -82,15 +80,6 @@ impl Digest {
 
     /// Adds the words of a block: as many at once as the processor can.
     pub fn add_block(&mut self, block: &Block) {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            #[target_feature(enable = "avx512f,avx512dq")]
-            fn wide(block: &Block) -> u128 {
-                sum_of(block)
-            }
-            // SAFETY: the processor has the features that the function is compiled for.
-            return self.merge(Self(unsafe { wide(block) }));
-        }
         self.merge(Self(sum_of(block)));
     }
 

@@ -299,20 +299,24 @@ impl Manifest {
     /// Replaces all entries that depend on the leaves, but for the parts, by those of these words.
     pub fn set_leaves(&mut self, words: &[u64]) {
         self.clear_leaves();
-        words.iter().for_each(|&first| self.add_block(&Block { first, depth: 0 }));
-        self.finish();
+        words.iter().for_each(|&first| _ = self.add_block(&Block { first, depth: 0 }));
     }
 
-    /// Counts no leaves, and gives every octant the digest of none.
+    /// Counts no leaves, and gives the mesh and every octant the digest of none.
     pub fn clear_leaves(&mut self) {
         (self.leaves, self.leaves_by_level, self.leaves_by_side) = Default::default();
+        self.digest = Digest::default();
         self.octant_digests = vec![Digest::default(); OCTANTS];
     }
 
-    /// Adds all leaves of a block to the counts and to the digest of its octant. Call [`Self::finish`] after the last.
-    pub fn add_block(&mut self, block: &Block) {
+    /// Adds all leaves of a block to the counts, and their digest, which is returned, to those of its octant and of the mesh.
+    pub fn add_block(&mut self, block: &Block) -> Digest {
         self.count(block.first, block.leaves());
-        self.octant_digests[octant_index(block.first)].add_block(block);
+        let mut digest = Digest::default();
+        digest.add_block(block);
+        self.octant_digests[octant_index(block.first)].merge(digest);
+        self.digest.merge(digest);
+        digest
     }
 
     /// Counts this many words of the level and side of one, and leaves the digests unchanged. An invalid level or side counts among all leaves alone.
@@ -327,12 +331,6 @@ impl Manifest {
             2 => self.leaves_by_side.crossing += leaves,
             _ => {}
         }
-    }
-
-    /// Computes the digest of all words from those of the octants, which saves one addition per leaf.
-    pub fn finish(&mut self) {
-        self.digest = Digest::default();
-        self.octant_digests.iter().for_each(|&octant| self.digest.merge(octant));
     }
 
     /// Reads the manifest of a directory.

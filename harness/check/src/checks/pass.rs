@@ -5,11 +5,10 @@
 
 use super::identical::Named;
 use super::{Check, CheckResult};
-use contract::digest::Digest;
 use contract::failure::Result;
 use contract::htg::Block;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Part, octant_index};
+use contract::manifest::{Manifest, Part};
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::tree::{Builder, Tree};
 use contract::word;
@@ -54,8 +53,6 @@ struct State {
     nodes_max: usize,
     tally: Manifest,
     linear: CheckResult,
-    /// Number of leaves by the low seven bits of their words, which are level and side.
-    by_code: [u64; 128],
     /// The last word of each part so far.
     last_of_part: Vec<Option<u64>>,
     /// The last word that was added to the tree.
@@ -73,23 +70,19 @@ impl State {
         let mut tally = Manifest { root: manifest.root, parts, ..Manifest::default() };
         tally.clear_leaves();
         let (linear, builder) = (CheckResult::new(CHECK.name), Builder::default());
-        Self { nodes_max, tally, linear, by_code: [0; 128], last_of_part, last: 0, builder }
+        Self { nodes_max, tally, linear, last_of_part, last: 0, builder }
     }
 
     /// Adds to counts and digests, and checks the order.
     fn count(&mut self, part: usize, run: &[Block]) {
-        let Self { tally: Manifest { root, parts, octant_digests, .. }, .. } = self;
-        let (last, Part { file, leaves, digest }) =
-            (&mut self.last_of_part[part], &mut parts[part]);
+        let (last, root) = (&mut self.last_of_part[part], self.tally.root);
         for block in run {
-            let (mut of_block, word) = (Digest::default(), block.first);
-            of_block.add_block(block);
+            let (of_block, word) = (self.tally.add_block(block), block.first);
+            let Part { file, leaves, digest } = &mut self.tally.parts[part];
             digest.merge(of_block);
-            octant_digests[octant_index(word)].merge(of_block);
             *leaves += block.leaves();
-            self.by_code[(word & 127) as usize] += block.leaves();
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
-                let [before, word] = [before, word].map(|word| Named(Some(word), *root));
+                let [before, word] = [before, word].map(|word| Named(Some(word), root));
                 self.linear.report(format_args!("{file} is not sorted: {word} follows {before}"));
             }
         }
@@ -115,8 +108,6 @@ impl State {
     }
 
     fn finish(mut self) -> Pass {
-        (0..).zip(self.by_code).for_each(|(code, leaves)| self.tally.count(code, leaves));
-        self.tally.finish();
         self.linear.examined = self.tally.leaves;
         let tree = (self.builder.nodes() <= self.nodes_max).then(|| self.builder.finish());
         Pass { tally: self.tally, linear: self.linear, tree }

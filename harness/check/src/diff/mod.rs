@@ -81,10 +81,10 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport> {
         let mut manifest = mesh.manifest.clone();
         manifest.clear_leaves();
         mesh.visit(&mut |_, blocks| {
-            blocks.iter().for_each(|b| manifest.add_block(&Block { first: b.first & mask, ..*b }));
+            let masked = blocks.iter().map(|b| Block { first: b.first & mask, ..*b });
+            masked.for_each(|block| _ = manifest.add_block(&block));
             Ok(())
         })?;
-        manifest.finish();
         mesh.manifest = manifest;
     }
     let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests);

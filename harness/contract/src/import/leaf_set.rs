@@ -99,11 +99,10 @@ impl ImportedTree {
         };
         let mut manifest = manifest_of(tree.root, case, program);
         tree.blocks(&mut |run| {
-            run.iter().for_each(|block| manifest.add_block(block));
+            run.iter().for_each(|block| _ = manifest.add_block(block));
             true
         })
         .map_err(Failure::input)?;
-        manifest.finish();
         assert_eq!(manifest.leaves, tree.leaves, "leaves of the walk, and of the bits of nodes");
         Ok(Some(Self { tree, manifest }))
     }
