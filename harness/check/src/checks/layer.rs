@@ -5,8 +5,8 @@
 //! `keep` is `all`, for every l. Every leaf less than n - 1 cells of level D from a crossing leaf of level D has
 //! at least level D. If crossing leaves are deleted, leaves adjacent to one have at least level D: by the extra layer
 //! of section 6 for n < 3, and by the layers themselves for larger n. The check detects neither layers that are too
-//! thick nor, without the case, missing layers around deleted crossing leaves. With n = 1, the minimum distance is that of the
-//! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
+//! thick nor, without the case, missing layers around deleted crossing leaves. With n = 1, the layers are the 2:1 balance at
+//! every level. Of the definition `balance` checks it, so that an imbalance is reported once; of a promise of layers this check does.
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::spacing::Crossed;
@@ -31,30 +31,31 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         return result.lacks(UNKNOWN_INPUTS);
     }
     let tree = subject.tree_with_deleted();
-    match Crossed::of(subject).filter(|_| !subject.promises.definition) {
-        // Such a promise says nothing about the sides of leaves.
-        Some(crossed) => check_tree(&crossed.labelled(tree), terms, result),
-        None => check_tree(tree, terms, result),
+    let is_balance = terms.layer_cells_min == 1 && subject.promises.definition;
+    let crossed = Crossed::of(subject).filter(|_| !subject.promises.definition);
+    // Such a promise says nothing about the sides of leaves.
+    let labelled = crossed.map(|crossed| crossed.labelled(tree));
+    let tree = labelled.as_ref().unwrap_or(tree);
+    if !is_balance {
+        check_layers(tree, terms, result);
     }
+    check_surface_layer(tree, terms, result);
     let has_extra_layer =
         !terms.keep_crossing && tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
-    let none = terms.layer_cells_min == 1 && !has_extra_layer;
+    let none = is_balance && !has_extra_layer;
     let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
     let missing = some_leaves(subject).or_else(|| none.then(why));
     result.requires(missing.or_else(|| several_levels(subject)));
 }
 
-fn check_tree(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
+fn check_layers(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
-        let required = terms.keep == Keep::All || level < terms.level_surface;
+        let required = n == 1 || terms.keep == Keep::All || level < terms.level_surface;
         required.then(|| n * edge_of(level))
     };
-    if n > 1 {
-        let what = &format!("a layer is thinner than {n} cells");
-        check_gap(tree, (&terms.root, what), margin, &ALL_AXES, 1, result);
-    }
-    check_surface_layer(tree, terms, result);
+    let what = &format!("a layer is thinner than {n} cell{}", if n == 1 { "" } else { "s" });
+    check_gap(tree, (&terms.root, what), margin, &ALL_AXES, 1, result);
 }
 
 /// Minimum distance between a crossing or deleted leaf of this level and any leaf coarser than the surface level,
@@ -127,7 +128,7 @@ mod tests {
             leaves.iter().any(|(coarse, _)| {
                 let distance = fine.distance(coarse);
                 let levels = coarse.level + 1..fine.level;
-                let required = |l: &u8| n > 1 && (all || *l < terms.level_surface);
+                let required = |l: &u8| n == 1 || all || *l < terms.level_surface;
                 let layer = levels.filter(required).any(|l| distance < n * edge_of(l));
                 let surface = terms.level_surface;
                 let at_surface = *side == Side::Crossing && fine.level == surface;
@@ -142,7 +143,8 @@ mod tests {
     /// away from a coarser leaf.
     fn checked(tree: &Tree, terms: &Manifest) -> CheckResult {
         let mut result = CheckResult::new("layer");
-        check_tree(tree, terms, &mut result);
+        check_layers(tree, terms, &mut result);
+        check_surface_layer(tree, terms, &mut result);
         result
     }
 
