@@ -21,7 +21,7 @@ const PAIRS_MAX: usize = 1 << 22;
 
 /// Pairs of facets whose interiors intersect, counted once for all copies of each with the same winding. Degenerate facets and pairs of facets with
 /// the same vertices are left out.
-pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
+pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: usize) -> Finding {
     let facet = |f: u32| &input.case.facets_lattice[f as usize];
     let has_area = |f: &u32| normal(facet(*f)) != [0; 3];
     let are_same = |a: &FacetLattice, b: &FacetLattice| a.iter().all(|v| b.contains(v));
@@ -38,7 +38,11 @@ pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
         };
         pairs.extend(others.into_iter().filter(|&g| f < g).filter(are_pair).map(|g| (f, g)));
     }
-    let is_rounding = |&(f, g): &(u32, u32)| depth(facet(f), facet(g)) <= ROUNDING;
+    let is_rounding = |&(f, g): &(u32, u32)| {
+        let agree = shells.outward(f).zip(shells.outward(g)).map(|(f, g)| f == g);
+        let is_opposite = agree.map(|agree| agree == (dot(normal(facet(f)), normal(facet(g))) < 0));
+        depth((facet(f), facet(g)), is_opposite == Some(true)) <= ROUNDING
+    };
     pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
     Finding {
         count: pairs.len() as u64,
@@ -77,11 +81,11 @@ pub fn intersect(a: &FacetLattice, b: &FacetLattice) -> bool {
 }
 
 /// An upper bound on the length of the least shift that separates the interiors of two intersecting triangles, in
-/// lattice units; 0 in one plane, where the smallest shift along the normal does. Those of one plane that face the same way bound
-/// volumes on the same side of it, which that shift does not separate.
-fn depth(a: &FacetLattice, b: &FacetLattice) -> f64 {
+/// lattice units; 0 in one plane, where the smallest shift along the normal does, if they bound volumes on opposite sides of it. Volumes
+/// on the same side are not separated by that shift.
+fn depth((a, b): (&FacetLattice, &FacetLattice), is_opposite: bool) -> f64 {
     let along = |axis: [i64; 3]| overlap(a, b, axis) as f64 / (dot(axis, axis) as f64).sqrt();
-    let opposite = Some(normal(a)).filter(|n| dot(*n, normal(b)) <= 0);
+    let opposite = is_opposite.then(|| normal(a));
     axes(a, b).chain(opposite).map(along).fold(f64::INFINITY, f64::min)
 }
 
@@ -128,6 +132,7 @@ fn place(input: &Input, f: u32, g: u32) -> Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edges::Edges;
     use crate::input::Requested;
     use crate::tree::Point;
     use contract::lattice::UNITS_PER_EDGE;
@@ -149,9 +154,11 @@ mod tests {
         let [p, q, r] = plane;
         let facets = vec![plane, across, [r, q, p]];
         let input = Input::new(facets, Requested::default()).unwrap();
-        let mut tree = FacetTree::new(&input.case.facets_lattice);
+        let lattice = &input.case.facets_lattice;
+        let shells = Shells::new(&Edges::new(&input.case.facets), lattice);
+        let mut tree = FacetTree::new(lattice);
         let found = |tree: &FacetTree| {
-            let finding = intersections(&input, tree, 5);
+            let finding = intersections(&input, tree, &shells, 5);
             (finding.count, finding.is_lower_bound)
         };
         assert_eq!(found(&tree), (2, false));
@@ -202,10 +209,10 @@ mod tests {
     #[test]
     fn the_depth_is_the_least_shift_that_separates() {
         let a = [[0, 0, 0], [80, 0, 0], [0, 80, 0]];
-        assert_eq!(depth(&a, &[[20, 20, -3], [20, 20, 50], [30, 20, 50]]), 3.0);
-        let [p, q, r] = a.map(|[x, y, z]| [x + 20, y, z]);
-        assert_eq!(depth(&a, &[p, r, q]), 0.0);
-        assert!(depth(&a, &[p, q, r]) > 10.0);
+        assert_eq!(depth((&a, &[[20, 20, -3], [20, 20, 50], [30, 20, 50]]), false), 3.0);
+        let shifted = a.map(|[x, y, z]| [x + 20, y, z]);
+        assert_eq!(depth((&a, &shifted), true), 0.0);
+        assert!(depth((&a, &shifted), false) > 10.0);
     }
 
     proptest! {

@@ -35,7 +35,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     findings.push(edges::stray(input, &edges, first));
     findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
-    findings.push(intersections::intersections(input, &tree, first));
+    findings.push(intersections::intersections(input, &tree, &shells, first));
     findings.push(intersections::overlaps(input, &tree, &shells, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, &shells, cell));

@@ -103,11 +103,12 @@ impl Shells {
         Self { all, of }
     }
 
-    /// Whether the normal of a facet points out of the solid that its shell bounds; none if its shell is open, or its winding inconsistent.
+    /// Whether the normal of a facet points out of the solid that its shell bounds; none if its shell is open, its winding inconsistent, or its
+    /// volume zero, as where a solid appears twice, once inside out.
     pub fn outward(&self, facet: u32) -> Option<bool> {
         let shell = self.all.get(self.of[facet as usize] as usize)?;
         let is_inward = (shell.volume_sixfold < 0) != shell.is_nested;
-        shell.is_oriented.then_some(!is_inward)
+        (shell.is_oriented && shell.volume_sixfold != 0).then_some(!is_inward)
     }
 
     /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
