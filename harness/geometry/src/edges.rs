@@ -144,17 +144,21 @@ pub fn stray(input: &Input, edges: &Edges, first: usize) -> Finding {
     finding
 }
 
-/// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.
+/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. A facet with a repeated vertex is degenerate, not a
+/// duplicate.
 pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Duplicates);
-    let mut originals = HashMap::new();
+    let mut copies: HashMap<_, (u32, u64)> = HashMap::new();
     let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
     for (corners, facet) in all.filter(|([a, b, c], _)| a != b && b != c) {
-        let original = *originals.entry(corners).or_insert(facet);
-        if original != facet {
-            finding.add(first, || Place::new(vec![original, facet], input.centroid(facet)));
+        let (original, count) = copies.entry(corners).or_insert((facet, 0));
+        *count += 1;
+        if *original != facet {
+            finding.add(first, || Place::new(vec![*original, facet], input.centroid(facet)));
         }
     }
+    let counts = copies.values().map(|(_, count)| count);
+    finding.count_changing = counts.filter(|&count| count % 2 == 0).map(|count| count - 1).sum();
     finding
 }
 

@@ -97,11 +97,11 @@ impl Finding {
 }
 
 impl Kind {
-    /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
+    /// Whether every occurrence can change the mesh's region. Openings, duplicates and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
-            Self::NonManifoldOdd | Self::Stray | Self::Duplicates => true,
-            Self::Overlaps | Self::Rounded | Self::OutsideRoot => true,
+            Self::NonManifoldOdd | Self::Stray | Self::Overlaps => true,
+            Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -178,6 +178,9 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
     match finding.kind {
         Kind::Openings => openings(finding, input, (width, finest)),
+        Kind::Duplicates if finding.count_changing == 0 => {
+            "No effect: each of these facets appears an odd number of times, which rays pass like one.".into()
+        }
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
         }
@@ -208,8 +211,8 @@ fn openings(finding: &Finding, input: &Input, (widest, finest): (f64, f64)) -> S
     }
     // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
     format!(
-        "At least one cell wide: {} of {}, the widest {widest}. {meaning} Below 3.5 cells that depends on the position in the \
-         lattice. Close it or mesh with a greater spacing. The rim of a sheet counts, too; a sheet has no inside.",
+        "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {widest}. {meaning} Below 3.5 cells that \
+         depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
         finding.count_changing, finding.count
     )
 }
@@ -258,7 +261,12 @@ mod tests {
                 false,
                 "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
             ),
-            (14.0, 2, true, "At least one cell wide: 2 of 3, the widest 14.0"),
+            (
+                14.0,
+                2,
+                true,
+                "At least one cell wide, where a box is finer one of its cells: 2 of 3, the widest 14.0",
+            ),
         ] {
             let text = of_width(Kind::Openings, width, changing, with_cell);
             assert!(text.starts_with(beginning), "{width}, {changing}, {with_cell}: {text}");
@@ -299,20 +307,20 @@ mod tests {
         ];
         let text = |kind, changing| of_width(kind, 3.0, changing, true);
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
-        meanings.push(text(Kind::Intersections, 0));
+        meanings.extend([Kind::Intersections, Kind::Duplicates].map(|kind| text(kind, 0)));
         assert!(
             meanings[13].starts_with("No effect: the facets overlap back to back in one plane")
         );
         assert!(meanings[7].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();
-        assert_eq!(meanings.len(), kinds.len() + 1);
+        assert_eq!(meanings.len(), kinds.len() + 2);
         let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.row().0).collect();
         assert_eq!(titles.len(), kinds.len());
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
-        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Duplicates, Kind::Overlaps];
+        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Overlaps];
         let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(

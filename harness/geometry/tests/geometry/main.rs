@@ -136,6 +136,10 @@ fn a_repeated_facet_is_a_duplicate_in_any_order_of_its_vertices() {
     let found = diagnosis(facets, Some(0.25));
     assert_eq!(counts(&found), [(Kind::NonManifoldOdd, 3), (Kind::Duplicates, 1)]);
     assert_eq!(first(&found, Kind::Duplicates).facets, [5, 12]);
+    // Rays pass three copies like one, but two like none.
+    let copies = |n: usize| diagnosis(cube().repeat(n), Some(0.25));
+    let of_copies = |n| (count(&copies(n), Kind::Duplicates), copies(n).changes_region);
+    assert_eq!([2, 3].map(of_copies), [(12, true), (24, false)]);
     assert!(found.changes_region);
 }
 
@@ -210,6 +214,23 @@ fn boxes_that_share_part_of_a_face_intersect_in_its_plane() {
 }
 
 /// Only facets in one plane overlap, but between x = 2 and 4 there are two volumes, and rays find none.
+#[test]
+fn a_solid_that_appears_twice_with_other_diagonals_changes_the_region() {
+    // Every other diagonal of its faces, wound outward or inward.
+    let other = cube()
+        .chunks(2)
+        .flat_map(|f| {
+            let ([a, b, c], d) = (f[0], f[1][2]);
+            quad([b, c, d, a])
+        })
+        .collect::<Vec<_>>();
+    let reversed = other.iter().map(|&[a, b, c]| [c, b, a]).collect();
+    for other in [other, reversed] {
+        let found = diagnosis([cube(), other].concat(), Some(0.25));
+        assert!(found.changes_region, "{found}");
+    }
+}
+
 #[test]
 fn boxes_that_overlap_with_flush_sides_change_the_region() {
     let boxes = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0, 0.0, 0.0], [6.0, 4.0, 4.0])].concat();
