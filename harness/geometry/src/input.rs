@@ -4,10 +4,13 @@ use std::path::Path;
 
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
+use contract::files;
 use contract::lattice::Root;
-use contract::manifest::Keep;
-use contract::stl;
+use contract::manifest::{ExtentBox, Keep};
+use contract::stl::{self, Body};
+use parry3d_f64::bounding_volume::BoundingVolume as _;
 use serde::Serialize;
+use toml::Table;
 
 use super::tree::{Aabb, Point, bounds};
 
@@ -38,7 +41,7 @@ pub struct Extent {
 /// A geometry, ready for diagnosis.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// A case of at least one and at most 2^31 / 3 facets, without boxes and seeds.
+    /// A case of at least one and at most 2^31 / 3 facets, without seeds.
     pub case: Case,
     /// Edge length of the cells at the surface, in the user's units; none if no spacing was given.
     pub cell: Option<f64>,
@@ -50,20 +53,25 @@ impl Input {
     /// # Errors
     /// If a file cannot be read or the geometry cannot be meshed.
     pub fn read(path: &Path, mut requested: Requested) -> Result<Self> {
-        let (facets, solids) = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-            let case = Case::read(path)?;
-            let cell = case.root.edge_of(case.level_surface);
-            requested.keep = case.keep;
-            requested.spacing_min = requested.spacing_min.or(Some(cell));
-            if requested.root_scale.is_none() {
-                requested.root = requested.root.or(Some(case.root));
-            }
-            (case.facets, case.solids)
-        } else {
-            let body = stl::read(path)?;
-            (body.facets, body.solids)
-        };
-        let mut input = Self::new(facets, requested).map_err(|e| Failure::about(path, e))?;
+        let wrong = |why: String| Failure::about(path, why);
+        let (table, Body { facets, solids }) =
+            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+                let Case { facets, solids, rules, .. } = Case::read(path)?;
+                requested.keep = rules.keep;
+                let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
+                let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;
+                table.retain(|key, _| match key {
+                    "root" | "root_scale" => {
+                        requested.root.or(requested.root_scale.map(|_| rules.root)).is_none()
+                    }
+                    // A seed may lie beyond another root.
+                    _ => !["geometry", "generator", "seeds"].contains(&key),
+                });
+                (table, Body { facets, solids })
+            } else {
+                (Table::new(), stl::read(path)?)
+            };
+        let mut input = Self::of(table, facets, requested).map_err(wrong)?;
         input.case.solids = solids;
         Ok(input)
     }
@@ -74,18 +82,32 @@ impl Input {
     /// One sentence if the geometry cannot be meshed: it has no facets or too many, a vertex is not finite or too
     /// far outside the root, or root and spacing contradict the definition.
     pub fn new(facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
+        Self::of(Table::new(), facets, requested)
+    }
+
+    /// A geometry with the keys of its case file that no other ones replace.
+    fn of(mut table: Table, facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
         if facets.is_empty() {
             return Err("the geometry has no facets".to_owned());
         }
         if facets.len() > FACETS_MAX {
             return Err(format!("{} facets exceed the limit of {FACETS_MAX}", facets.len()));
         }
+        table.extend(Table::try_from(requested).expect("numbers are representable in TOML"));
+        let is_known = table.contains_key("spacing_min");
         // A spacing above every root edge stands for level 0.
-        let spacing_min = requested.spacing_min.or(Some(f64::MAX));
-        let text = toml::to_string(&Requested { spacing_min, ..requested });
-        let case = Case::from_parts(&text.expect("numbers are representable in TOML"), facets)?;
-        let cell = requested.spacing_min.map(|_| case.root.edge_of(case.level_surface));
+        table.entry("spacing_min").or_insert(f64::MAX.into());
+        let case = Case::from_parts(&table.to_string(), facets)?;
+        let cell = is_known.then(|| case.root.edge_of(case.level_surface));
         Ok(Self { case, cell })
+    }
+
+    /// Edge length of the finest cells at a surface in a region of the user's units: those of the boxes that meet it, if they are finer.
+    pub fn cell_in(&self, region: &Aabb) -> Option<f64> {
+        let corner = |at| Point::from(self.case.root.to_user(at));
+        let meets = |b: &&ExtentBox| Aabb::new(corner(b.min), corner(b.max)).intersects(region);
+        let edges = self.case.boxes.iter().filter(meets).map(|b| self.case.root.edge_of(b.level));
+        self.cell.map(|cell| edges.fold(cell, f64::min))
     }
 
     /// The centroid of a facet, in the user's units.
@@ -133,7 +155,7 @@ mod tests {
              generator = {{ shape = 'cube', facets = 12 }}\n",
             own.origin, own.edge
         );
-        std::fs::write(&path, text).unwrap();
+        std::fs::write(&path, &text).unwrap();
         let read = |requested| {
             let input = Input::read(&path, requested).unwrap();
             assert_eq!((input.case.keep, input.case.facets.len()), (Keep::Inside, 12));
@@ -147,9 +169,17 @@ mod tests {
             read(Requested { root: Some(other), ..Requested::default() }),
             (other, Some(0.5))
         );
-        // The generated cube has edge 1.
-        let (root, cell) = read(Requested { root_scale: Some(4.0), ..Requested::default() });
-        assert_eq!((root.edge, cell), (4.0, Some(0.5)));
+        // The generated cube has edge 1. The spacing is that of the file, not its cell's.
+        let root_scale = Some(4.2);
+        let (root, cell) = read(Requested { root_scale, ..Requested::default() });
+        assert_eq!((root.edge, cell), (4.2, Some(0.525 / 2.0)));
+        std::fs::write(&path, text.replace("0.5", "0.6")).unwrap();
+        assert_eq!(read(Requested { root_scale, ..Requested::default() }).1, Some(0.525));
+        let a_box = "[[box]]\nmin = [0.0, 0.0, 0.0]\nmax = [1.0, 1.0, 1.0]\nspacing = 0.1\n";
+        std::fs::write(&path, format!("{text}{a_box}")).unwrap();
+        let input = Input::read(&path, Requested::default()).unwrap();
+        let within = |at: f64| input.cell_in(&Aabb::new(Point::splat(at), Point::splat(at)));
+        assert_eq!([0.5, 1.5].map(within), [Some(0.0625), Some(0.5)]);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use contract::sets::Sets;
 use super::edges::{Edges, Use};
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::tree::Point;
+use super::tree::{Aabb, Point};
 
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
 const TOLERANCE: f64 = 2.0;
@@ -36,19 +36,21 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     });
     let mut places = places(&rims, &edges.points);
     let width = |place: &Place| place.width.unwrap_or(0.0);
-    places.sort_by(|a, b| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
+    places.sort_by(|(a, _), (b, _)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
     // Without a spacing, any may be chosen, up to the finest.
-    let cell = input.cell.unwrap_or(input.case.root.edge / f64::from(CELLS_PER_EDGE));
+    let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
+    let leaks =
+        |(place, extent): &&(Place, Aabb)| width(place) >= input.cell_in(extent).unwrap_or(finest);
     Finding {
         count: places.len() as u64,
-        count_changing: places.iter().filter(|place| width(place) >= cell).count() as u64,
-        places: places.into_iter().take(first).collect(),
+        count_changing: places.iter().filter(leaks).count() as u64,
+        places: places.into_iter().take(first).map(|(place, _)| place).collect(),
         ..Finding::new(Kind::Openings)
     }
 }
 
-/// The places of connected segments.
-fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<Place> {
+/// The places of connected segments, with their bounding boxes.
+fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
     let mut sets = Sets::new(points.len());
     rims.iter().for_each(|segment| sets.union(segment.ends[0], segment.ends[1]));
     let mut labelled: Vec<(u32, Use)> =
@@ -63,7 +65,8 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<Place> {
         facets.dedup();
         facets.truncate(Place::FACETS_MAX);
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
-        Place { width: Some(free_width(&ends)), ..Place::new(facets, centre) }
+        let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
+        (Place { width: Some(free_width(&ends)), ..Place::new(facets, centre) }, extent)
     };
     labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }

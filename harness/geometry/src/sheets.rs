@@ -1,4 +1,4 @@
-//! Thin sheets: facets with an opposite one less than one cell away, by rays along their normals.
+//! Thin sheets: facets with an opposite one less than one cell away, or one of a finer box there, by rays along their normals.
 //!
 //! From points of each facet, a ray leads inward and one outward. The first facet that it meets within a cell is opposite if it has no
 //! vertex in common with the first one and their normals differ by at least 120 degrees. They are a wall on the inner side and a gap on
@@ -15,7 +15,7 @@ use std::collections::HashSet;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::shells::Shells;
-use super::tree::{FacetTree, Point};
+use super::tree::{Aabb, FacetTree, Point};
 
 /// The cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
@@ -40,6 +40,10 @@ struct Hit {
 /// Thin walls and thin gaps, each with the place at the quantile of its width.
 pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [Finding; 2] {
     let unit = input.case.root.edge / UNITS_PER_EDGE as f64;
+    let reach = |at: Point| {
+        let at = Point::from(input.case.root.origin) + unit * at;
+        input.cell_in(&Aabb::new(at, at)).unwrap_or(cell) / unit
+    };
     [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
         let may_be = |a: u32, b: u32| {
             let facets = [a, b].map(|facet| input.case.facets_lattice[facet as usize]);
@@ -49,7 +53,7 @@ pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [F
         };
         let sign = |facet| if shells.outward(facet) == Some(false) { -1.0 } else { 1.0 };
         let normal = |facet: u32| Some(tree.triangle(facet).normal()? * sign(facet));
-        let (mut hits, is_lower_bound) = hits(tree, side, cell / unit, normal, may_be);
+        let (mut hits, is_lower_bound) = hits(tree, side, reach, normal, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
         // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.
         let of_sheets: HashSet<u32> = hits.iter().map(|hit| hit.from).collect();
@@ -68,7 +72,7 @@ pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [F
 fn hits(
     tree: &FacetTree,
     side: f64,
-    reach: f64,
+    reach: impl Fn(Point) -> f64,
     normal: impl Fn(u32) -> Option<Point>,
     may_be: impl Fn(u32, u32) -> bool,
 ) -> (Vec<Hit>, bool) {
@@ -79,9 +83,9 @@ fn hits(
         }
         let Some(outward) = normal(facet) else { continue };
         let triangle = tree.triangle(facet);
-        let is_large = triangle.edges().iter().any(|edge| edge.length() > reach);
         let [a, b, c] = *triangle.vertices();
         let centre = (a + b + c) / 3.0;
+        let is_large = triangle.edges().iter().any(|edge| edge.length() > reach(centre));
         let starts = [centre, centre.midpoint(a), centre.midpoint(b), centre.midpoint(c)];
         let starts = &starts[..if is_large { starts.len() } else { 1 }];
         for start in starts {
@@ -90,7 +94,7 @@ fn hits(
                 visits.set(visits.get() + 1);
                 may_be(facet, other)
             };
-            let (first, width) = tree.first_hits(&ray, reach, is_obstacle);
+            let (first, width) = tree.first_hits(&ray, reach(*start), is_obstacle);
             let faces = |other: &u32| normal(*other).is_some_and(|n| n.dot(outward) <= OPPOSITE);
             if let Some(other) = first.into_iter().find(faces).filter(|_| width > TOUCHING) {
                 let area = triangle.area() / starts.len() as f64;
