@@ -64,6 +64,10 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         files::check_writable(file).map_err(|error| Failure::at(file, error))?;
     }
     let case = case.as_deref().map(read_case).transpose()?;
+    let dir = file.parent().and_then(|dir| dir.join(".").canonicalize().ok());
+    let is_part = format.ending == ".vtkhdf" && dir.is_some() && dir == mesh.canonicalize().ok();
+    let why = "it would be a part of the mesh, in whose directory it is: name another one";
+    Failure::unless(!is_part, format!("{}: {why}", file.display()))?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
     let progress = Progress;
