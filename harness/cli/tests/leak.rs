@@ -167,7 +167,10 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
     // The scripted mesher gives no leaf an inside: nothing was closed, so nothing was examined.
     with(r#""leaks": []"#);
     let (code, text) = fixture.leak(&[]);
-    assert!(code == 2 && text.contains("nothing to examine"), "{code}: {text}");
+    assert!(
+        code == 2 && text.contains("as where an opening is wider than four cells"),
+        "{code}: {text}"
+    );
 }
 
 /// The box is closed at both coarser spacings, with and without a seed in it.

@@ -126,7 +126,7 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
     if leaks.is_empty() && closed == 0 {
         let fact = match case.seeds.is_empty() {
             true => {
-                "no leaf is inside by its rays at this spacing, as where every facet appears twice"
+                "no leaf is inside by its rays at this spacing, as where an opening is wider than four cells or every facet appears twice"
             }
             false => "the flow of the seeds reaches all leaves at this spacing",
         };
