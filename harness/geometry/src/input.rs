@@ -54,23 +54,23 @@ impl Input {
     /// If a file cannot be read or the geometry cannot be meshed.
     pub fn read(path: &Path, mut requested: Requested) -> Result<Self> {
         let wrong = |why: String| Failure::about(path, why);
-        let (table, Body { facets, solids }) =
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-                let Case { facets, solids, rules, .. } = Case::read(path)?;
-                requested.keep = rules.keep;
-                let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
-                let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;
-                table.retain(|key, _| match key {
-                    "root" | "root_scale" => {
-                        requested.root.or(requested.root_scale.map(|_| rules.root)).is_none()
-                    }
-                    // A seed may lie beyond another root.
-                    _ => !["geometry", "generator", "seeds"].contains(&key),
-                });
-                (table, Body { facets, solids })
-            } else {
-                (Table::new(), stl::read(path)?)
-            };
+        let (table, Body { facets, solids }) = if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+        {
+            let Case { facets, solids, rules, .. } = Case::read(path)?;
+            requested.keep = rules.keep;
+            let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
+            let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;
+            table.retain(|key, _| match key {
+                "root" | "root_scale" => requested.root.is_none() && requested.root_scale.is_none(),
+                // A seed may lie beyond another root.
+                _ => !["geometry", "generator", "seeds"].contains(&key),
+            });
+            (table, Body { facets, solids })
+        } else {
+            (Table::new(), stl::read(path)?)
+        };
         let mut input = Self::of(table, facets, requested).map_err(wrong)?;
         input.case.solids = solids;
         Ok(input)

@@ -16,6 +16,8 @@ use std::path::Path;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";
+/// The [`Setup::experiment`] of runs for targets.
+pub const TARGETS: &str = "targets";
 /// The greatest number of ranks whose values are stored rank by rank.
 pub const BY_RANK_MAX: usize = 1024;
 
@@ -367,7 +369,8 @@ pub struct Run {
 
 impl Run {
     /// Whether it has ranks, at most a million, of which all values are stored, or none; a wall time, which is at most that of the launcher
-    /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and sums that are those of the ranks and of the phases.
+    /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and
+    /// sums that are those of the ranks and of the phases.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);

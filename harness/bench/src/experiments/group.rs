@@ -13,11 +13,10 @@
 //! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
 use super::entry::{
-    ASSUMED, Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread,
+    ASSUMED, Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread, TARGETS,
 };
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
-use crate::study::file::EXPERIMENT;
 use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median, median_of};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -403,7 +402,7 @@ fn pooled_nodes(lines: &[Line]) -> Vec<String> {
 
 /// What the case of a run is by name: that of a series, or a mesh of targets, which may have the name of another case.
 fn case_of(Setup { experiment, case, .. }: &Setup) -> String {
-    if experiment == EXPERIMENT { format!("mesh {case}") } else { case.clone() }
+    if experiment == TARGETS { format!("mesh {case}") } else { case.clone() }
 }
 
 /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network, rules or

@@ -5,7 +5,7 @@
 
 use super::measure::{self, Input, Measure};
 use crate::experiments::cases::grown;
-use crate::experiments::entry::{Comm, Entry, Line, Setup};
+use crate::experiments::entry::{Comm, Entry, Line, Setup, TARGETS};
 use crate::order::distinct;
 use crate::{name_of, read_toml, refuse};
 use run::engine::description::{Description, is_own};
@@ -23,8 +23,6 @@ const FACETS: RangeInclusive<usize> = 1..=100_000_000;
 /// Valid numbers of ranks.
 const RANKS: RangeInclusive<usize> = 1..=65_536;
 
-/// The [`Setup::experiment`] of runs for targets.
-pub const EXPERIMENT: &str = "targets";
 /// A study file.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -85,7 +83,7 @@ impl RunSpec {
     /// The run's parameters on a mesh with this spacing and n.
     pub(super) fn setup(&self, spacing_min: f64, layer_cells_min: u32) -> Setup {
         Setup {
-            experiment: EXPERIMENT.to_owned(),
+            experiment: TARGETS.to_owned(),
             ranks: self.ranks,
             comm: self.comm,
             partitioner: self.partitioner.clone(),

@@ -162,10 +162,9 @@ impl Judged {
 
 #[cfg(test)]
 mod tests {
-    use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{ASSUMED, Comm, Machine, Session};
+    use crate::experiments::entry::{ASSUMED, Comm, Machine, Session, TARGETS};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -195,7 +194,7 @@ mod tests {
 
     fn setup(ranks: usize) -> Setup {
         let of = run(Comm::Mpi, 1, &[("a", &vec![1.0; ranks])]).setup;
-        let (experiment, case) = (EXPERIMENT.to_owned(), "cube".to_owned());
+        let (experiment, case) = (TARGETS.to_owned(), "cube".to_owned());
         Setup { experiment, case, partitioner: String::new(), weights: String::new(), ..of }
     }
 

@@ -29,7 +29,7 @@ const RATES: &str = "rate hit_ratio checks";
 /// Beginnings of words of which less is better, whatever the other words are.
 const LOSSES: &str = "miss error fail wait";
 
-/// Whether a metric has one of these words, in small or capital letters, or a word that begins so; `end` is `_` for whole words.
+/// Whether a metric has one of these words, or a word that begins so, in upper or lower case; `end` is `_` for whole words.
 fn has(name: &str, words: &str, end: &str) -> bool {
     let name = plain(name).to_lowercase().replace(|c: char| !c.is_alphanumeric(), "_");
     words.split(' ').any(|word| format!("_{name}_").contains(&format!("_{word}{end}")))

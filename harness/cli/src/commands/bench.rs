@@ -1,10 +1,9 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
 use crate::output::{put, unwritten};
-use bench::experiments::entry::{Entry, Line, NoResult, Setup};
+use bench::experiments::entry::{Entry, Line, NoResult, Setup, TARGETS};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
-use bench::study::file::EXPERIMENT;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
 use clap::Args;
@@ -227,7 +226,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let runs: HashSet<_> = results.map(|run| of_series(&run.setup)).collect();
     let mut left_out = lines.iter().filter_map(|line| match &line.entry {
         // A row says itself that it was left out.
-        Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != EXPERIMENT),
+        Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != TARGETS),
         _ => None,
     });
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
@@ -275,7 +274,7 @@ mod tests {
         assert_eq!(code(&study, &[], &all), EXIT_HOLDS);
         // What it does in one experiment does not make up for another one.
         let [mut weak, mut of_row] = [all[2].clone(), all[2].clone()];
-        for (line, experiment) in [(&mut weak, "weak"), (&mut of_row, EXPERIMENT)] {
+        for (line, experiment) in [(&mut weak, "weak"), (&mut of_row, TARGETS)] {
             let Entry::LeftOut(left) = &mut line.entry else { panic!("{line:?}") };
             left.setup.experiment = experiment.into();
         }

@@ -76,7 +76,7 @@ fn a_run_without_a_result_is_of_the_machine_and_the_case_of_its_session() {
         of_machine("2", "fast"),
         failed,
         of("2", 1, "strong"),
-        of("2", 1, EXPERIMENT),
+        of("2", 1, TARGETS),
     ];
     let groups = Groups::of(&lines);
     let names: Vec<_> = groups.all.iter().map(|g| (&*g.setup.engine, &*g.setup.case)).collect();
