@@ -1,4 +1,4 @@
-//! The widest path between two places and its narrowest place, to 5 %.
+//! The widest path between two places and its narrowest place: to 5 %, unless many places are equally narrow.
 //!
 //! The *radius* of a cell is the distance from its centre to the nearest facet plus half of its diagonal: no larger ball has its centre in
 //! the cell. The path whose least radius is greatest bounds the balls that pass. Along a leg of length l between points of clearance a and
@@ -13,7 +13,7 @@
 //! the width counts from there.
 
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
-use super::space::Space;
+use super::space::{Cell, Space};
 use super::{Ends, to_user};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
@@ -27,9 +27,9 @@ use std::collections::BTreeSet;
 const PRECISION: f64 = 1.05;
 /// Cells of a smaller half diagonal, in radii of the ball that passes, show the clearance to `PRECISION`.
 const SMALL: f64 = 0.015;
-/// Searches for the widest path through the same leaves, at most, once some ball passes along it. If they do not suffice, the bounds on the
-/// width are wider apart than 5 %. A ball passes once the cells are so small that no path through a wall seems as wide as one around it.
-const SEARCHES_MAX: usize = 300;
+/// Searches in which all places are measured. After them, only the narrow places of the last path are, and the upper bound stays: along a
+/// slit that is equally wide everywhere, each search would otherwise lead to the next place.
+const SEARCHES_MAX: usize = 30;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
 
@@ -58,6 +58,24 @@ impl Way {
 
     fn clearance(&self) -> f64 {
         self.points[self.narrowest()].clearance
+    }
+
+    /// The radius of the ball that the bound promises, but for the precision.
+    fn wanted(&self) -> f64 {
+        self.bound / PRECISION
+    }
+
+    /// The first points of the legs along which this ball is not shown to pass.
+    fn narrow(&self) -> impl Iterator<Item = &Place> {
+        // The last point is a leg of no length.
+        let legs = self.points.iter().zip(self.points[1..].iter().chain(self.points.last()));
+        legs.filter(|(from, to)| passing(from, to) < self.wanted()).map(|(from, _)| from)
+    }
+
+    /// Whether a cell is within two radii of these points.
+    fn near(&self) -> impl Fn(&Cell) -> bool {
+        let (narrow, reach) = (self.narrow().map(|p| p.at).collect::<Vec<_>>(), 2.0 * self.bound);
+        move |cell| narrow.iter().any(|at| cell.centre().distance(*at) < reach)
     }
 
     /// The radius of a ball that passes along all legs.
@@ -141,7 +159,7 @@ fn root() -> Aabb {
 impl Search<'_> {
     /// The widest path.
     fn converge(&mut self) -> Result<Way> {
-        let (mut cap, mut searches) = (f32::INFINITY, 0);
+        let (mut cap, mut searches, mut bound) = (f32::INFINITY, 0, None);
         loop {
             let found = self.space.widest(self.ends, cap, Space::radius, self.watch)?;
             let (cells, width) = found.expect("free leaves join the ends");
@@ -152,9 +170,21 @@ impl Search<'_> {
             }
             searches += 1;
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
-            if searches >= SEARCHES_MAX && way.passing() > 0.0 || !self.divide(&way) {
-                return Ok(way);
+            if searches == SEARCHES_MAX {
+                bound = Some(way.bound);
+                self.keep_near(&way, &cells);
             }
+            if !self.divide(&way) {
+                return Ok(Way { bound: bound.unwrap_or(way.bound), ..way });
+            }
+        }
+    }
+
+    /// Closes all cells that may be narrow, except those of a path and near its narrow places, so that only these are measured further.
+    fn keep_near(&mut self, way: &Way, cells: &[u32]) {
+        let (near, wanted) = (way.near(), way.wanted());
+        for (i, cell) in (0..).zip(&mut self.space.cells) {
+            cell.is_open &= cell.shown() >= wanted || near(cell) || cells.contains(&i);
         }
     }
 
@@ -179,25 +209,16 @@ impl Search<'_> {
     /// Divides the cells in which a path may be too narrow for the ball that its bound promises, and those near its narrow legs that
     /// promise this ball but do not show it: along a slit, many are equally wide. Returns whether there are any.
     fn divide(&mut self, way: &Way) -> bool {
-        let (points, radius) = (&way.points, way.bound);
-        let wanted = radius / PRECISION;
-        // The last point is a leg of no length.
-        let legs = points.iter().zip(points[1..].iter().chain(points.last()));
-        let narrow: Vec<&Place> =
-            legs.filter(|(from, to)| passing(from, to) < wanted).map(|(from, _)| from).collect();
-        let is_near = |at: Point| narrow.iter().any(|place| at.distance(place.at) < 2.0 * radius);
+        let near = way.near();
         let cells = self.space.cells.iter().zip(0..).filter(|(cell, _)| {
-            let clearance = f64::from(cell.clearance);
-            // Of the leg from its centre to a face, if this is as far from facets.
-            let shown = clearance - cell.edge() / 4.0;
-            let promises = shown < wanted && clearance + cell.half_diagonal() >= radius;
-            cell.is_open && promises && is_near(cell.centre())
+            let is_doubtful = cell.shown() < way.wanted() && cell.promised() >= way.bound;
+            cell.is_open && is_doubtful && near(cell)
         });
         let mut divided: BTreeSet<u32> = cells.map(|(_, i)| i).collect();
-        divided.extend(narrow.iter().map(|place| place.cell));
+        divided.extend(way.narrow().map(|place| place.cell));
         divided.retain(|&i| {
             let cell = &self.space.cells[i as usize];
-            cell.half_diagonal() > SMALL * radius && cell.edge() > 1.0
+            cell.half_diagonal() > SMALL * way.bound && cell.edge() > 1.0
         });
         divided.iter().for_each(|&cell| self.space.split(cell));
         !divided.is_empty()
@@ -213,8 +234,8 @@ impl Search<'_> {
         let is_near = |at: Point| narrow.iter().any(|p| p.at.distance(at) < REACH * leaf);
         let mut is_any = false;
         for cell in self.space.cells.iter_mut().filter(|cell| !cell.is_open) {
-            cell.is_open = is_near(cell.centre());
-            is_any |= cell.is_open;
+            cell.is_open = cell.is_free || is_near(cell.centre());
+            is_any |= cell.is_open && !cell.is_free;
         }
         is_any
     }

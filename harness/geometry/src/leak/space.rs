@@ -20,7 +20,7 @@ pub struct Cell {
     low: [u32; 3],
     edge: u32,
     /// Whether no facet touches the leaf that it is part of.
-    is_free: bool,
+    pub is_free: bool,
     /// Whether paths may enter it. Of a cell that facets cross, its parts that they do not touch become passable.
     pub is_open: bool,
     /// Distance from the centre to the nearest facet; not a number before it is needed.
@@ -36,6 +36,17 @@ impl Cell {
     /// The centre.
     pub fn centre(&self) -> Point {
         Point::from_array(self.low.map(|c| f64::from(c) + self.edge() / 2.0))
+    }
+
+    /// The radius of a ball that passes from the centre to a face, if this is as far from facets.
+    pub fn shown(&self) -> f64 {
+        f64::from(self.clearance) - self.edge() / 4.0
+    }
+
+    /// No ball of a greater radius has its centre in the cell.
+    pub fn promised(&self) -> f64 {
+        // Exceeds the rounding to f32.
+        (f64::from(self.clearance) + self.half_diagonal()) * (1.0 + 1e-6)
     }
 
     /// Distance from the centre to the corners.
@@ -163,14 +174,13 @@ impl<'a> Space<'a> {
         }))
     }
 
-    /// No ball of a greater radius has its centre in the cell.
+    /// [`Cell::promised`].
     pub fn radius(&mut self, cell: u32) -> f64 {
         let cell = &mut self.cells[cell as usize];
         if cell.clearance.is_nan() {
             cell.clearance = self.facets.distance(cell.centre()) as f32;
         }
-        // Exceeds the rounding to f32.
-        (f64::from(cell.clearance) + cell.half_diagonal()) * (1.0 + 1e-6)
+        cell.promised()
     }
 
     /// The path between the cells of two ends, through open ones, whose least width is greatest, widths above `cap` being equal, and this
