@@ -129,8 +129,23 @@ const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the en
 
 impl fmt::Display for Answers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let examined: Vec<String> = self.examined.iter().map(Report::to_string).collect();
-        f.write_str(&examined.join("\n"))
+        // Many regions may have the same answer without a path.
+        let is_same = |a: &Report, b: &Report| {
+            let [a, b] = [a, b].map(|of| (of.to, of.is_leak, of.is_enclosed));
+            a == b && !a.1
+        };
+        for (i, same) in self.examined.chunk_by(is_same).enumerate() {
+            f.write_str(if i > 0 { "\n" } else { "" })?;
+            same[0].fmt(f)?;
+            if same.len() > 1 {
+                writeln!(
+                    f,
+                    "          The same holds for {} more starts (--json).",
+                    same.len() - 1
+                )?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -158,17 +173,18 @@ impl fmt::Display for Report {
             }
         };
         writeln!(f, "{verdict}{closed}")?;
-        describe(passage, f)
+        describe(passage, self.closes.is_some(), f)
     }
 }
 
-/// What is printed of a widest path.
-fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+/// What is printed of a widest path. Where no spacing closes it, as in a finer box, none is named.
+fn describe(passage: &Passage, is_closed: bool, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let n = &passage.narrowest;
     let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
     let (closing, end) = match n.is_end {
         true => (String::new(), END),
-        false => (format!("          Spacings above {max} {CLOSE}\n"), ""),
+        false if is_closed => (format!("          Spacings above {max} {CLOSE}\n"), ""),
+        false => (String::new(), ""),
     };
     let listed: Vec<String> = n.facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
     let more = match n.facets.len().saturating_sub(FACETS_MAX) {
@@ -256,6 +272,25 @@ mod tests {
         let remark = "facets    3\n          This is an end of the path: no place on the way is narrower, so there is no opening between \
             the ends.\n";
         assert!(text.contains(remark) && !text.contains("Spacings above"), "{text}");
+    }
+
+    #[test]
+    fn an_opening_that_no_spacing_closes_names_none() {
+        let report = Report { closes: None, ..leak(3, narrowest(3..5, 1, false)) };
+        let text = report.to_string();
+        assert!(text.contains(", at every spacing") && !text.contains("Spacings above"), "{text}");
+    }
+
+    #[test]
+    fn starts_with_the_same_answer_are_counted() {
+        let leak = leak(1, narrowest(3..4, 0, false));
+        let none = Report { is_leak: false, closes: None, passage: None, ..leak.clone() };
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let examined = vec![none.clone(), none.clone(), none, leak.clone(), leak.clone()];
+        let answers = Answers { schema: SCHEMA, case: String::new(), facets: 1, root, examined };
+        let same =
+            "no leak at this spacing\n          The same holds for 2 more starts (--json).\n";
+        assert_eq!(answers.to_string(), format!("{HEAD}{same}\n{leak}\n{leak}"));
     }
 
     #[test]
