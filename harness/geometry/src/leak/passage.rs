@@ -27,8 +27,9 @@ use std::collections::BTreeSet;
 const PRECISION: f64 = 1.05;
 /// Cells of a smaller half diagonal, in radii of the ball that passes, show the clearance to `PRECISION`.
 const SMALL: f64 = 0.015;
-/// Searches in which all places are measured. After them, only the narrow places of the last path are, and the upper bound stays: along a
-/// slit that is equally wide everywhere, each search would otherwise lead to the next place.
+/// Searches in which all places are measured. After them, and once a ball passes, so that no path leads through a wall, only the narrow
+/// places of the last path are, and the upper bound stays: along a slit that is equally wide everywhere, each search would otherwise lead to
+/// the next place.
 const SEARCHES_MAX: usize = 30;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
@@ -170,7 +171,7 @@ impl Search<'_> {
             }
             searches += 1;
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
-            if searches == SEARCHES_MAX {
+            if bound.is_none() && searches >= SEARCHES_MAX && way.passing() > 0.0 {
                 bound = Some(way.bound);
                 self.keep_near(&way, &cells);
             }
