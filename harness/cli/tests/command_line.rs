@@ -1,4 +1,4 @@
-//! The program as a process: version, completions, plain output and exit codes; and signals, which end every command, whatever it does, with
+//! The program as a process: version, plain output and exit codes; and signals, which end every command, whatever it does, with
 //! exit code 130, so that no process and no temporary file remains.
 
 use contract::leafset::LeafSet;
@@ -12,23 +12,8 @@ use std::thread::sleep;
 use std::time::Duration;
 use tempfile::TempDir;
 
-const COMMANDS: [&str; 15] = [
-    "verify",
-    "selftest",
-    "gate",
-    "bench",
-    "report",
-    "track",
-    "shrink",
-    "audit",
-    "leak",
-    "picture",
-    "export",
-    "import",
-    "diff",
-    "why",
-    "completions",
-];
+/// A case whose diagnosis is printed at once.
+const CUBE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../geometries/cube-small.toml");
 
 fn harness(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_harness")).args(arguments).output().unwrap()
@@ -52,16 +37,6 @@ fn the_version_names_the_commit_if_git_is_available() {
         let hash = commit.rsplit("-g").next().unwrap();
         assert!(hash.len() >= 12 && hash.chars().all(|c| c.is_ascii_hexdigit()), "{version}");
     }
-}
-
-#[test]
-fn completions_contain_every_command() {
-    for shell in ["bash", "zsh", "fish"] {
-        let script = printed(&["completions", shell]);
-        let missing: Vec<_> = COMMANDS.iter().filter(|name| !script.contains(*name)).collect();
-        assert!(missing.is_empty(), "{shell}: {missing:?}");
-    }
-    assert_eq!(harness(&["completions", "abacus"]).status.code(), Some(2));
 }
 
 #[test]
@@ -126,7 +101,7 @@ fn why_answers_for_a_directory() {
 #[test]
 fn a_closed_pipe_ends_the_printing_and_not_the_command() {
     let script =
-        format!("set -o pipefail; {} completions bash | true", env!("CARGO_BIN_EXE_harness"));
+        format!("set -o pipefail; {} geometry {CUBE} | true", env!("CARGO_BIN_EXE_harness"));
     for _ in 0..5 {
         let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
         assert_eq!((ended.status.code(), ended.stderr), (Some(0), Vec::new()));
@@ -137,7 +112,7 @@ fn a_closed_pipe_ends_the_printing_and_not_the_command() {
 fn output_that_cannot_be_written_is_an_exit_code() {
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    let ended = command.args(["completions", "bash"]).stdout(full()).output().unwrap();
+    let ended = command.args(["geometry", CUBE]).stdout(full()).output().unwrap();
     assert_eq!(ended.status.code(), Some(4));
     let message = String::from_utf8(ended.stderr).unwrap();
     assert!(message.contains("standard output cannot be written"), "{message}");

@@ -69,9 +69,10 @@ fn check_rows(rows: &[Vec<String>], report: &Report) {
 /// The counts of a row's checks, and time, rate and memory of its run.
 fn numbers(Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<String> {
     let measured = run.map(|run| {
+        let cells = run.cells as f64;
         let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
-        let memory = run.bytes_per_cell().map(|bytes| format!("{bytes:.1}"));
-        let rate = Some(format!("{:.3}", run.cells_per_s() / 1e6));
+        let memory = run.peak_rss_bytes.map(|peak| format!("{:.1}", peak as f64 / cells.max(1.0)));
+        let rate = Some(format!("{:.3}", cells / run.time_wall_s.max(1e-9) / 1e6));
         [time_s, rate, memory].map(|number| number.unwrap_or("-".to_owned()))
     });
     let counts = [pass, fail, left_out].map(|n| n.to_string());

@@ -70,9 +70,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Failure::unless(!is_part, format!("{}: {why}", file.display()))?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let progress = Progress;
     let options = Options {
-        watch: &progress,
+        watch: &Progress,
         case: case.as_ref(),
         label: label.unwrap_or_default(),
         regions: regions.unwrap_or_default(),
@@ -80,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     };
     let written =
         (format.write)(&Export { mesh: &mesh, selection: &selection, options: &options }, file);
-    progress.finish();
+    Progress.finish();
     let Summary { leaves, bytes, notes } = written?;
     let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
     let per_cell = bytes as f64 / leaves as f64;

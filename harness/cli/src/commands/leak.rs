@@ -74,13 +74,12 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         fs::remove_dir_all(mesh)?;
         Ok(tree)
     };
-    let progress = Progress;
     let of_case = Cell::new(None);
     let make = |level| match of_case.take() {
         Some(words) if level == case.level_surface => Ok(words),
         _ => Ok(tree(level)?.words),
     };
-    let mut leaks = Leaks::new(&case, make, &progress)?;
+    let mut leaks = Leaks::new(&case, make, &Progress)?;
     let ends = match (arguments.from, arguments.to) {
         (Some(from), to) => vec![(from, to.unwrap_or(Target::Far))],
         (None, Some(to)) => {
@@ -88,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             vec![(seed, to)]
         }
         (None, None) => {
-            progress.step("meshing the base tree of the case");
+            Progress.step("meshing the base tree of the case");
             let tree = tree(case.level_surface)?;
             let leaked = leaked(&case, &tree)?;
             of_case.set(Some(tree.words));
@@ -100,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         }
     };
     let answers = leaks.answers(&ends)?;
-    progress.finish();
+    Progress.finish();
     write(arguments, &answers)?;
     if ends.is_empty() {
         println!(

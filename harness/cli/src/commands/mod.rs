@@ -17,9 +17,8 @@ mod track;
 mod verify;
 mod why;
 
-use clap::{CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
-use contract::failure::{EXIT_HOLDS, Result};
+use clap::{Parser, Subcommand};
+use contract::failure::Result;
 use std::hint::black_box;
 use std::thread;
 
@@ -74,11 +73,6 @@ pub enum Command {
     Diff(diff::Arguments),
     /// Explain the size and the side of the leaf at a point
     Why(why::Arguments),
-    /// Print a completion script for a shell
-    Completions {
-        /// The shell
-        shell: Shell,
-    },
     /// End with a fault, for the tests of the exit codes
     #[command(hide = true)]
     Planted {
@@ -112,12 +106,6 @@ impl Command {
             Self::Import(arguments) => import::run(&arguments),
             Self::Diff(arguments) => diff::run(&arguments),
             Self::Why(arguments) => why::run(&arguments),
-            Self::Completions { shell } => {
-                let mut script = Vec::new();
-                clap_complete::generate(shell, &mut Arguments::command(), "harness", &mut script);
-                print!("{}", String::from_utf8_lossy(&script));
-                Ok(EXIT_HOLDS)
-            }
             Self::Planted { fault } => plant(&fault),
         }
     }
@@ -137,6 +125,7 @@ fn plant(fault: &str) -> ! {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory;
     use run::verify::options::Need;
 
     #[test]

@@ -7,7 +7,6 @@ use crate::figure::canvas::COLOURS;
 use contract::mesh::Leaf;
 use contract::word::Side;
 use std::collections::BTreeSet;
-use std::fmt;
 
 /// The quantity that colours show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -18,12 +17,6 @@ pub enum Colour {
     Rank,
     /// Outside, inside or crossing
     Side,
-}
-
-impl fmt::Display for Colour {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(["level", "rank", "side"][*self as usize])
-    }
 }
 
 /// The colour of one value.
@@ -49,6 +42,11 @@ const LIGHTEST: f64 = 0.5;
 const TINTS: [f64; 3] = [0.35, -0.4, 0.15];
 
 impl Colour {
+    /// The name of the quantity.
+    pub fn name(self) -> &'static str {
+        ["level", "rank", "side"][self as usize]
+    }
+
     /// The value of a leaf: its level, rank or code of the side.
     pub fn value(self, leaf: &Leaf) -> u32 {
         match self {
@@ -80,7 +78,7 @@ impl Colour {
         if self == Self::Rank && key.len() > RANKS_NAMED {
             return (Vec::new(), format!("{} ranks, coloured in turn", key.len()));
         }
-        (key.iter().map(|e| (e.name.clone(), e.fill)).collect(), self.to_string())
+        (key.iter().map(|e| (e.name.clone(), e.fill)).collect(), self.name().to_owned())
     }
 }
 

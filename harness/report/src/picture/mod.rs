@@ -217,7 +217,7 @@ impl Picture {
     /// One sentence on what the picture shows.
     pub fn title(&self) -> String {
         let (plane, cells) = (self.plane_name(), self.squares.leaves);
-        format!("Slice {plane} of a mesh, {cells} cells by {}", self.colour)
+        format!("Slice {plane} of a mesh, {cells} cells by {}", self.colour.name())
     }
 
     /// The minimum and the maximum corner of a square.

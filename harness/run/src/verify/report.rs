@@ -46,18 +46,6 @@ pub struct Run {
     pub peak_rss_bytes: Option<u64>,
 }
 
-impl Run {
-    /// Cells per second of wall time.
-    pub fn cells_per_s(&self) -> f64 {
-        self.cells as f64 / self.time_wall_s.max(1e-9)
-    }
-
-    /// Peak memory per cell, if it is known.
-    pub fn bytes_per_cell(&self) -> Option<f64> {
-        Some(self.peak_rss_bytes? as f64 / self.cells.max(1) as f64)
-    }
-}
-
 /// One check of one result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Check {

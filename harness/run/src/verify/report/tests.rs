@@ -128,9 +128,3 @@ proptest! {
         prop_assert!(refused, "change {wrong} of {report:?}");
     }
 }
-
-#[test]
-fn speeds_are_per_second_and_memory_per_cell() {
-    let run = &report().cases[0].runs[0];
-    assert_eq!((run.cells_per_s(), run.bytes_per_cell()), (76_000.0, Some(10.0)));
-}
