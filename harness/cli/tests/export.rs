@@ -92,9 +92,10 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("polyMesh", &[], "one that ends in .vtu, .p8est, /polyMesh"),
         ("front.stl", &["--case", "cube-small"], "--case has no effect on .stl"),
         ("front.stl", &["--side", "crossing"], "no selected cell borders a crossing cell"),
-        ("front.vtp", &["--case", "absent.toml"], "absent.toml"),
+        ("front.vtp", &["--case", "cube-small"], "--case has no effect on .vtp"),
+        ("case/constant/polyMesh", &["--case", "absent.toml"], "absent.toml"),
         (
-            "front.vtp",
+            "case/constant/polyMesh",
             &["--case", "cube-small"],
             "has another root (corner [0.0, 0.0, 0.0], edge 8): give the case",
         ),
@@ -234,7 +235,7 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
     let (code, output, error) = export(&place, "front.stl", &[]);
     assert_eq!((code, output.as_str()), (2, ""));
     assert_eq!(error, "harness: front.stl exists: remove it, or choose another name\n");
-    assert_eq!(export(&place, "front.vtp", &["--case", "case.toml"]).0, 0);
+    assert_eq!(export(&place, "front.vtp", &[]).0, 0);
     let (code, output, _) = export(&place, "part.vtp", &["--clip", "0,0,0,8,8,4"]);
     assert!(
         code == 0 && output.contains("12 faces") && output.contains("open at 8 edges"),
@@ -258,7 +259,7 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
         (stated.replace(&digest, &"1".repeat(32)), "case.toml", "and its manifest states 1111"),
     ] {
         fs::write(&manifest, manifest_text).unwrap();
-        let (code, output, error) = export(&place, "front.vtp", &["--case", case]);
+        let (code, output, error) = export(&place, "case/constant/polyMesh", &["--case", case]);
         assert_eq!((code, output.as_str(), error.lines().count()), (2, "", 1), "{error}");
         assert!(error.contains(why), "{error}");
     }

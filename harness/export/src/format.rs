@@ -62,8 +62,8 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         ending: ".vtp",
-        purpose: "the surface towards the body, for a near-body mesher: polygons for VTK, with --case the gap to the wall",
-        options: &["--case"],
+        purpose: "the surface towards the body, for a near-body mesher: polygons for VTK",
+        options: &[],
         write: front::vtp,
     },
     Format {

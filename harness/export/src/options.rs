@@ -62,7 +62,7 @@ impl Export<'_> {
 pub struct Options<'a> {
     /// Whoever waits for the export.
     pub watch: &'a dyn Watch,
-    /// The case of the mesh: its solids become patches of OpenFOAM, and its facets are those to which a surface has gaps.
+    /// The case of the mesh: its solids become patches of OpenFOAM.
     pub case: Option<&'a Case>,
     /// Width of OpenFOAM's labels.
     pub label: Label,

@@ -23,7 +23,7 @@ pub struct Arguments {
     mesh: Input,
     /// The file to write; its name decides the format. An existing file is replaced, but no .stl, which may be a body, and no polyMesh
     file: PathBuf,
-    /// The case that was meshed: its named solids become patches (polyMesh, .cgns), and .vtp has the gap to the wall; name in geometries/catalogue.toml or path of a case file
+    /// The case that was meshed: its named solids become patches (polyMesh, .cgns); name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
     case: Option<String>,
     /// Bits of a label of OpenFOAM [default: 32]

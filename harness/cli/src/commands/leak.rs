@@ -4,13 +4,10 @@ use crate::options::{Output, examples, point, whole_seconds};
 use crate::output::put;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result, Watch};
-use contract::files::write_atomically;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Result, Watch};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::{PlainCase, StlForm};
-use export::polydata;
-use geometry::leak::report::{Answers, Passage};
 use geometry::leak::{Leaks, Target};
 use report::pretty;
 use run::engine::layout::SERIAL;
@@ -36,9 +33,6 @@ pub struct Arguments {
     /// Write the answer as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Write the paths as VTK polylines with the free width at each point
-    #[arg(long, value_name = "FILE.vtp")]
-    vtk: Option<Output>,
     /// Time limit of every single run of the mesher
     #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
     timeout: Duration,
@@ -52,9 +46,6 @@ pub struct Arguments {
 /// # Errors
 /// If the case cannot be read or meshed, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let is_vtp = |file: &Output| file.extension().is_some_and(|extension| extension == "vtp");
-    let is_named = arguments.vtk.as_ref().is_none_or(is_vtp);
-    Failure::unless(is_named, "the file name of --vtk must end in .vtp")?;
     let programs = Programs::find("mesher", &arguments.programs)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
@@ -100,7 +91,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     };
     let answers = leaks.answers(&ends)?;
     Progress.finish();
-    write(arguments, &answers)?;
+    Progress.check()?;
+    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(&answers)))?;
     if ends.is_empty() {
         println!(
             "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (one that is open at all three is not examined: --from)",
@@ -132,23 +124,6 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
         return Err(format!("{fact}, so there is nothing to examine: {START}"));
     }
     Ok(leaks)
-}
-
-/// Writes the requested files, unless the user has interrupted.
-fn write(arguments: &Arguments, answers: &Answers) -> Result<()> {
-    let passages: Vec<&Passage> =
-        answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
-    if passages.is_empty() && arguments.vtk.is_some() {
-        eprintln!(
-            "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"
-        );
-    }
-    Progress.check()?;
-    if let Some(file) = arguments.vtk.as_deref().filter(|_| !passages.is_empty()) {
-        let written = write_atomically(file, |out| polydata::paths(&passages, out));
-        written.map_err(|error| Failure::at(file, error))?;
-    }
-    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(answers)))
 }
 
 fn target(text: &str) -> Result<Target, String> {

@@ -10,11 +10,8 @@
 //! corners of its polygon, as in a mesh of polyhedra. Then every edge belongs to an even number of polygons, except where the front ends at the
 //! root's boundary or at the limits of a selection.
 //!
-//! The *gap* of a face is the least distance of any of its points from a facet of the case. Distances are those of the facets on the lattice, on which
-//! the mesh was made; a vertex is at most half a lattice unit along each axis from where the user put it.
-//!
 //! Invariants, which are executed before a file has its name: every polygon is the square of its face with points on its edges, and faces the
-//! leaf; the areas of a closed front cancel; a gap is not greater than the distance of the face's centre.
+//! leaf; the areas of a closed front cancel.
 
 #[cfg(test)]
 mod tests;
@@ -22,21 +19,21 @@ mod tests;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use contract::case::Case;
 use contract::failure::{Failure, Result};
 use contract::files::fill_atomically;
-use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::lattice::Root;
 use contract::number::number;
-use contract::octant::{UNITS_PER_CELL, edge_of};
+use contract::octant::edge_of;
 use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
-use geometry::tree::{FacetTree, Point};
-use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
+use vtkio::model::{
+    Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version,
+    VertexNumbers, Vtk,
+};
 
 use crate::leaves::{Content, Leaves, Square};
-use crate::options::{Export, Options, Summary, require_new};
+use crate::options::{Export, Summary, require_new};
 use crate::points::{Points, Polygons, edges, to_user};
-use crate::polydata::{self, array};
 
 /// A square of the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,23 +78,19 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
     Ok(faces)
 }
 
-/// Writes the polygons, with the cell data `level` and `side` of the leaf, its `spacing`, and with a case the `gap` of each face.
+/// Writes the polygons, with the cell data `level` and `side` of the leaf, and its `spacing`.
 ///
 /// # Errors
-/// If the mesh cannot be read, is not of the case, or has no such faces, if the file cannot be written, or if the user interrupts.
+/// If the mesh cannot be read or has no such faces, if the file cannot be written, or if the user interrupts.
 pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
-    let Export { mesh, options, .. } = export;
-    options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     write(export, path, &|Front { root, faces, points, polygons }, out| {
-        let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
         let points = points.all.iter().flat_map(|at| to_user(at, root));
         let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
-        let mut cell = vec![
+        let cell = vec![
             array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
             array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
             array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
         ];
-        cell.extend(gaps.map(|gaps| array("gap", gaps)));
         let piece = PolyDataPiece {
             points: points.collect::<Vec<f64>>().into(),
             polys: Some(VertexNumbers::XML {
@@ -107,8 +100,28 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
             data: Attributes { point: Vec::new(), cell },
             ..PolyDataPiece::default()
         };
-        Ok(polydata::write("front towards the body", piece, out)?)
+        Ok(write_xml(piece, out)?)
     })
+}
+
+/// One value for each point or cell.
+fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
+    Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
+}
+
+/// Writes the polygons in VTK's format of XML.
+fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
+    let file = Vtk {
+        version: Version { major: 1, minor: 0 },
+        title: "front towards the body".into(),
+        byte_order: ByteOrder::LittleEndian,
+        data: DataSet::inline(piece),
+        file_path: None,
+    };
+    // The errors of vtkio do not say what the system said.
+    let mut bytes = Vec::new();
+    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
+    out.write_all(&bytes)
 }
 
 /// Writes the polygons as triangles. Coordinates have single precision.
@@ -173,24 +186,6 @@ fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     Ok(triangles)
-}
-
-/// The gap of each face in the user's units; infinite if the case has no facets.
-fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>> {
-    let facets = FacetTree::new(&case.facets_lattice);
-    let unit = case.root.edge / UNITS_PER_EDGE as f64;
-    let gap = |(index, face): (u64, &Face)| {
-        options.check_at(index)?;
-        let units = |c| (i64::from(c) * UNITS_PER_CELL) as f64;
-        let corners = face.corners().map(|corner| Point::from(corner.map(units)));
-        let centre = facets.distance(corners[0].midpoint(corners[2]));
-        let gap = facets.distance_of_square(&corners);
-        let why = "a facet enters a leaf that does not cross: `harness audit --case` shows what is wrong with the mesh";
-        // One unit for rounding.
-        Failure::unless(gap <= centre + 1.0, why)?;
-        Ok(gap * unit)
-    };
-    (0..).zip(faces).map(gap).collect()
 }
 
 impl Front {

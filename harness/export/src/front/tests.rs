@@ -8,43 +8,21 @@ use rustc_hash::FxHashMap;
 use std::collections::HashMap;
 use std::fs;
 
-/// Two facets at z = 3.3 through a root of edge 8, without the cells of edge 1 that they cross.
-fn plate() -> (Case, Vec<u64>) {
-    let corner = |x: f32, y: f32| [x, y, 3.3];
-    let facets = vec![
-        [corner(-1.0, -1.0), corner(9.0, -1.0), corner(9.0, 9.0)],
-        [corner(-1.0, -1.0), corner(9.0, 9.0), corner(-1.0, 9.0)],
-    ];
-    let text = "spacing_min = 8.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0";
+/// Without the cells of edge 1 that a plate at z = 3.3 crosses, both sheets end at the root's boundary, along 32 edges each.
+#[test]
+fn both_sides_of_a_plate_are_open_at_the_boundary() {
+    let root = Root { origin: [0.0; 3], edge: 8.0 };
     let words =
         words_with_sides(|o| o.level < 3, |o| (o.corner[2] >> 16 != 3).then_some(Side::Outside));
-    (Case::from_parts(text, facets).unwrap(), words)
-}
-
-#[test]
-fn the_gap_to_a_plate_is_the_height_above_it() {
-    let (case, words) = plate();
-    let (dir, mesh) = in_root(&words, 2, |i| i / 256, case.root);
-    let faces = front(&whole(&mesh, &options())).unwrap();
-    let gaps = gaps(&case, &faces, &options()).unwrap();
-    assert_eq!(faces.len(), 128);
-    for (face, gap) in faces.iter().zip(&gaps) {
-        let expected = if face.square.is_high { 0.3 } else { 0.7 };
-        assert!((gap - expected).abs() < 1e-6, "{gap} of {face:?}");
-    }
-    // Both sheets end at the root's boundary, along 32 edges each.
-    let options = Options { case: Some(&case), ..options() };
+    let (dir, mesh) = in_root(&words, 2, |i| i / 256, root);
     let path = dir.path().join("front.vtp");
-    let summary = vtp(&whole(&mesh, &options), &path).unwrap();
+    let summary = vtp(&whole(&mesh, &options()), &path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!((summary.leaves, summary.bytes), (128, text.len() as u64));
     assert!(summary.notes[0].starts_with("a surface of area 128, open at 64 edges"), "{summary:?}");
-    for array in ["level", "side", "spacing", "gap"] {
+    for array in ["level", "side", "spacing"] {
         assert!(text.contains(&format!("Name=\"{array}\"")), "{array}");
     }
-    let other = in_root(&words, 1, |_| 0, Root { edge: 4.0, ..case.root }).1;
-    let refused = vtp(&whole(&other, &options), &path).unwrap_err();
-    assert!(refused.to_string().contains("the mesh is not of the case"), "{refused}");
 }
 
 #[test]
