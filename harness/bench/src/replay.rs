@@ -109,13 +109,10 @@ impl Expected {
         if self.seconds <= limit_s {
             return Ok(None);
         }
-        match (limit_s / self.seconds_once) as u16 {
-            0 => Err(Failure::input(format!(
-                "one run of each took {} on the archive's machine: give --minutes",
-                duration(self.seconds_once)
-            ))),
-            repeats => Ok(Some(repeats)),
-        }
+        let (repeats, once) = ((limit_s / self.seconds_once) as u16, duration(self.seconds_once));
+        let why = format!("one run of each took {once} on the archive's machine: give --minutes");
+        Failure::unless(repeats > 0, why)?;
+        Ok(Some(repeats))
     }
 
     /// Executes the invariants at the head of this file.

@@ -104,6 +104,15 @@ pub struct Session {
     pub lacks: Lacks,
 }
 
+impl Session {
+    /// A sentence, if the load was so high that other work may have disturbed the runs.
+    pub fn disturbed(&self) -> Option<String> {
+        let load = self.load_average;
+        let why = "other processes may have disturbed a session, whose load average was";
+        (load > 0.5 * self.machine.cores as f64).then(|| format!("{why} {load:.1}"))
+    }
+}
+
 /// By program: what it does not do or promise.
 pub type Lacks = BTreeMap<String, Vec<String>>;
 
@@ -302,12 +311,10 @@ impl Setup {
 
     /// Returns partitioner and weights, or `default`.
     pub fn division(&self) -> String {
-        let chosen = match (self.partitioner.as_str(), self.weights.as_str()) {
-            ("", "") => "default".to_owned(),
-            (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
-        };
+        let chosen = format!("{} {}", self.partitioner, self.weights);
+        let chosen = if chosen == " " { "default" } else { chosen.trim() };
         let depth = self.level_base.map_or(String::new(), |level| format!(" depth {level}"));
-        chosen + &depth
+        format!("{chosen}{depth}")
     }
 }
 

@@ -152,11 +152,8 @@ fn useful_s(ranks: usize, phases: &[PhaseReport], time_wall_s: f64) -> Vec<f64> 
     if phases.is_empty() {
         return vec![time_wall_s; ranks];
     }
-    let mut total = vec![0.0; ranks];
-    for phase in phases {
-        total.iter_mut().zip(phase.time_useful_s()).for_each(|(total, useful)| *total += useful);
-    }
-    total
+    let times: Vec<Vec<f64>> = phases.iter().map(PhaseReport::time_useful_s).collect();
+    (0..ranks).map(|rank| times.iter().map(|of| of[rank]).sum()).collect()
 }
 
 fn phase(phase: &PhaseReport) -> Phase {

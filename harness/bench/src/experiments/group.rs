@@ -139,8 +139,8 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
     let phases = |run: &Run| -> Vec<(String, usize)> {
         run.phases.iter().map(|p| (p.name.clone(), p.useful_s.by_rank.len())).collect()
     };
-    let (first, mut total) = (phases(typical), vec![0.0; typical.setup.ranks]);
-    let is_complete = !first.is_empty() && first.iter().all(|phase| phase.1 == total.len());
+    let (first, ranks) = (phases(typical), typical.setup.ranks);
+    let is_complete = !first.is_empty() && first.iter().all(|phase| phase.1 == ranks);
     if runs.len() < 2 || !is_complete || runs.iter().any(|run| phases(run) != first) {
         return false;
     }
@@ -149,11 +149,10 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
             let of_run = |run: &Run| run.phases[p].useful_s.by_rank[rank];
             median_of(&runs.iter().map(of_run).collect::<Vec<f64>>())
         };
-        let times: Vec<f64> = (0..total.len()).map(of_rank).collect();
-        phase.useful_s = Spread::exact(&times);
-        total.iter_mut().zip(times).for_each(|(total, time)| *total += time);
+        phase.useful_s = Spread::exact(&(0..ranks).map(of_rank).collect::<Vec<f64>>());
     }
-    typical.useful_s = Spread::exact(&total);
+    let total = |rank: usize| typical.phases.iter().map(|p| p.useful_s.by_rank[rank]).sum();
+    typical.useful_s = Spread::exact(&(0..ranks).map(total).collect::<Vec<f64>>());
     true
 }
 

@@ -110,11 +110,6 @@ impl Measures {
         Self { schema: SCHEMA.to_owned(), of, ..Self::default() }
     }
 
-    /// Returns the entry of a case.
-    pub fn case(&mut self, name: &str) -> &mut CaseMeasures {
-        self.cases.entry(name.to_owned()).or_default()
-    }
-
     /// Parses a record, or the record contained in a gate's report.
     ///
     /// # Errors

@@ -49,7 +49,7 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             break;
         }
         if let Ok(new) = &new {
-            let of_case = measures.case(&case.name);
+            let of_case = measures.cases.entry(case.name.clone()).or_default();
             match name {
                 LayerName::Instructions => of_case.counted.clone_from(&new.counted),
                 // This layer and another one before that of instructions are of the same runs.

@@ -349,7 +349,8 @@ mod tests {
     fn a_record_and_a_report_read_back() {
         let mut measures =
             Measures::of_program(Measured { named: "m".into(), ..Measured::default() });
-        measures.case("cube").exact.insert("rays".into(), u64::MAX);
+        let case = measures.cases.entry("cube".into()).or_default();
+        case.exact.insert("rays".into(), u64::MAX);
         let json = serde_json::to_string(&measures).unwrap();
         assert_eq!(Measures::parse(json.as_bytes()).unwrap(), measures);
         let text = serde_json::to_vec(&GateReport::new(None, measures.clone())).unwrap();

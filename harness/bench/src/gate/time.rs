@@ -103,18 +103,16 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let seed = bench.options.seed.wrapping_add(u64::from(again));
     let mut random = Random(seed);
-    let (mut cpu, mut wall) = (Vec::new(), Vec::new());
-    for _ in 0..count {
+    let [mut cpu, mut wall] = [(); 2].map(|()| vec![[0.0; 3]; count]);
+    for round in 0..count {
         let mut order = [0, 1, 2];
         random.shuffle(&mut order);
-        let mut times = [(0.0, 0.0); 3];
         for index in order {
             let run = run(index)?;
-            times[index] = (run.time_cpu_s, run.time_wall_s);
+            // A microsecond is the resolution of the clocks.
+            cpu[round][index] = run.time_cpu_s.max(1e-6).ln();
+            wall[round][index] = run.time_wall_s.max(1e-6).ln();
         }
-        // A microsecond is the resolution of the clocks.
-        cpu.push(times.map(|(cpu_s, _)| f64::max(cpu_s, 1e-6).ln()));
-        wall.push(times.map(|(_, wall_s)| f64::max(wall_s, 1e-6).ln()));
     }
     let quantity = |(name, rounds): (&str, Vec<Round>)| {
         let found = compare(&rounds, rules.alpha.sqrt(), seed);

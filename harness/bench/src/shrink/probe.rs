@@ -132,10 +132,10 @@ impl Probe {
             }
         };
         let judged: Vec<Judged> = results.iter().filter_map(judged).collect();
-        match judged.is_empty() {
-            true => Err(left_out("no check had anything to check")),
-            false => Ok([(RUNS, None)].into_iter().chain(judged).collect()),
+        if judged.is_empty() {
+            return Err(left_out("no check had anything to check"));
         }
+        Ok([(RUNS, None)].into_iter().chain(judged).collect())
     }
 
     /// The checks of the engine's promises, and a second run if it is promised to be the same.

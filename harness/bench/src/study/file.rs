@@ -275,9 +275,8 @@ impl Study {
         }
         for (i, row) in self.row.iter().enumerate() {
             self.check_row(row).map_err(|why| format!("row {:?}: {why}", row.name))?;
-            if self.row[..i].iter().any(|other| other.name == row.name) {
-                return Err(format!("two rows are called {:?}", row.name));
-            }
+            let is_second = self.row[..i].iter().any(|other| other.name == row.name);
+            refuse(&[(is_second, &format!("two rows are called {:?}", row.name))])?;
         }
         Ok(())
     }

@@ -8,6 +8,8 @@ use super::measure::Sample;
 use crate::experiments::entry::{Entry, Line, Network, NoResult, Run, Setup};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
+use crate::name_of;
+use serde::Serialize;
 use std::collections::HashMap;
 
 /// A row of a table of targets.
@@ -24,7 +26,8 @@ pub struct Judged {
 }
 
 /// The verdict on a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The value is within the bounds.
     Met,
@@ -36,6 +39,13 @@ pub enum Verdict {
     Failed,
     /// The row was not measured: the user excluded it or a prerequisite is missing.
     LeftOut,
+}
+
+impl Verdict {
+    /// The words for it.
+    pub fn words(self) -> String {
+        name_of(&self).replace('_', " ")
+    }
 }
 
 /// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
@@ -137,32 +147,32 @@ impl Judged {
         }
     }
 
+    /// Whether it is missed, or a run failed.
+    pub fn is_bad(&self) -> bool {
+        matches!(self.verdict(), Verdict::Missed | Verdict::Failed)
+    }
+
     /// Returns name, target, measured value, how it was measured, and verdict.
     pub fn fields(&self) -> [String; 5] {
         let Row { name, measure, at_least, at_most, .. } = &self.row;
         let bounds = [("at least ", at_least), ("at most ", at_most)];
         let shown = |(word, b): (&str, &Option<f64>)| Some(word.to_owned() + &measure.show((*b)?));
         let target = bounds.into_iter().filter_map(shown).collect::<Vec<_>>().join(", ");
-        let word = match self.verdict() {
-            Verdict::Met => "met",
-            Verdict::Missed => "MISSED",
-            Verdict::ForComparison => "for comparison",
-            Verdict::Failed => "FAILED",
-            Verdict::LeftOut => "left out",
-        };
+        let words = self.verdict().words();
+        let words = if self.is_bad() { words.to_uppercase() } else { words };
         let why = if self.why.is_empty() { "" } else { ": " };
         let target = if target.is_empty() { "-".to_owned() } else { target };
         let (value, how) = match self.measured {
             Some((value, how)) => (measure.show(value), how),
             None => ("-".to_owned(), "-"),
         };
-        [name.clone(), target, value, how.to_owned(), format!("{word}{why}{}", self.why)]
+        [name.clone(), target, value, how.to_owned(), format!("{words}{why}{}", self.why)]
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::measure::Measure;
+    use super::super::measure::MEASURES;
     use super::*;
     use crate::experiments::entry::{ASSUMED, Comm, Machine, Session, TARGETS};
     use crate::testing::line;
@@ -307,7 +317,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "the row has a reason")]
     fn an_efficiency_above_1_without_a_reason_is_noticed() {
-        planted(|row| row.row.measure = Measure::named("efficiency").unwrap());
+        planted(|row| row.row.measure = MEASURES.iter().find(|m| m.name == "efficiency").unwrap());
     }
 
     #[test]

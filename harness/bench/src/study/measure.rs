@@ -102,11 +102,6 @@ pub static MEASURES: [Measure; 15] = [
 ];
 
 impl Measure {
-    /// Returns the measure of this name.
-    pub fn named(name: &str) -> Option<&'static Self> {
-        MEASURES.iter().find(|measure| measure.name == name)
-    }
-
     /// A value with its unit.
     pub fn show(&self, value: f64) -> String {
         let (factor, decimals, unit) = self.unit;
@@ -126,7 +121,7 @@ impl Measure {
 /// Reads the name of a measure.
 pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure, D::Error> {
     let name = String::deserialize(from)?;
-    Measure::named(&name).ok_or_else(|| {
+    MEASURES.iter().find(|measure| measure.name == name).ok_or_else(|| {
         let all: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
         D::Error::custom(format!("unknown variant `{name}`, expected one of {}", all.join(", ")))
     })
@@ -194,7 +189,7 @@ mod tests {
     }
 
     fn named(name: &str) -> &'static Measure {
-        Measure::named(name).unwrap()
+        MEASURES.iter().find(|measure| measure.name == name).unwrap()
     }
 
     fn value(name: &str, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {

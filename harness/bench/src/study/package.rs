@@ -113,16 +113,11 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
     put(to, &bytes)
 }
 
-/// Writes a file unless it is there.
+/// Writes a file unless another one is there.
 fn put(path: &Path, bytes: &[u8]) -> Result<()> {
-    match fs::read(path) {
-        Ok(before) if before == bytes => return Ok(()),
-        Ok(_) => {
-            let why = "two files of the study have this name: rename one";
-            return Err(Failure::input(format!("{}: {why}", file_name(path))));
-        }
-        Err(_) => {}
-    }
+    let is_same = fs::read(path).map_or(true, |before| before == bytes);
+    let why = format!("{}: two files of the study have this name: rename one", file_name(path));
+    Failure::unless(is_same, why)?;
     write_atomically(path, |out| out.write_all(bytes)).map_err(|error| Failure::at(path, error))
 }
 

@@ -45,13 +45,6 @@ pub struct SessionOptions {
     pub timeout: Duration,
 }
 
-impl SessionOptions {
-    /// Returns how often a run is repeated that the file repeats so often.
-    fn repeats(&self, of_file: usize) -> usize {
-        self.repeat.map_or(of_file, usize::from)
-    }
-}
-
 /// Why a row on MPI is left out without a launcher.
 const NO_LAUNCHER: &str = "the launcher is missing";
 
@@ -125,8 +118,8 @@ pub fn measure(
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
     let program = launcher.program();
     let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty());
-    let is_missing = rows.iter().any(|row| row.why == NO_LAUNCHER)
-        || has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
+    let is_missing = session.mpi_left_out() == Some(NO_LAUNCHER)
+        && (has_mpi || rows.iter().any(|row| row.why == NO_LAUNCHER));
     let missing =
         is_missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
@@ -253,7 +246,7 @@ impl Session<'_> {
                     points.extend(series.choices().iter().map(|(weights, partitioner)| {
                         let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
                         let setup = Setup { weights, partitioner, ..of_mesh.clone() };
-                        let repeats = self.options.repeats(series.repeats);
+                        let repeats = self.options.repeat.map_or(series.repeats, usize::from);
                         let (case, inputs) = (case.clone(), inputs.clone());
                         Planned { setup, case, inputs, repeats, warm_up: true, failed: false }
                     }));
@@ -287,7 +280,7 @@ impl Session<'_> {
             }
         };
         let case = base.write(spacing, n, mesh.cells.is_none())?;
-        let repeats = self.options.repeats(spec.repeats);
+        let repeats = self.options.repeat.map_or(spec.repeats, usize::from);
         let setup = spec.setup(spacing, n);
         let inputs = base.inputs;
         Ok(Planned { setup, case, inputs, repeats, warm_up: repeats > 1, failed: false })

@@ -419,8 +419,9 @@ mod tests {
     #[test]
     fn measures_of_a_gate_become_metrics_by_case() {
         let mut measures = Measures::of_program(Measured::default());
-        measures.case("cube").exact.insert("rays".into(), 6);
-        measures.case("cube").counted.insert("instructions".into(), 7);
+        let case = measures.cases.entry("cube".into()).or_default();
+        case.exact.insert("rays".into(), 6);
+        case.counted.insert("instructions".into(), 7);
         let here = Path::new(".");
         let of = |measures: &Measures, named| {
             Record::of_gate(&serde_json::to_vec(measures).unwrap(), named, here)

@@ -81,11 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     }
     let page = if place.join("README.md").exists() { "REPLAY.md" } else { "README.md" };
     put(page, readme(about, &lines, &expected))?;
-    let mut members = Vec::new();
-    for name in list(place)? {
-        let bytes = fs::metadata(place.join(&name))?.len();
-        members.push((name, bytes));
-    }
+    let sized = |name: String| Ok((name.clone(), fs::metadata(place.join(name))?.len()));
+    let members = list(place)?.into_iter().map(sized).collect::<Result<Vec<_>>>()?;
     put(METADATA, pretty(&metadata(about, &members, &lines)))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
     let is_compared = |value: &&Value| !matches!(value.found, Found::Time(_));
@@ -183,10 +180,10 @@ fn leave_out_missing(study: &mut Study) -> Result<()> {
         }
     }
     study.series.retain(|series| !series.engines.is_empty());
-    match study.series.is_empty() && study.row.is_empty() {
-        true => Err(Failure::missing("no program of the archive is installed here")),
-        false => Ok(()),
+    if study.series.is_empty() && study.row.is_empty() {
+        return Err(Failure::missing("no program of the archive is installed here"));
     }
+    Ok(())
 }
 
 /// A row per run with the number of exact values that are equal, and one for each other value.
@@ -227,14 +224,7 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
         "exact: {equal} equal, {differ} differ; ratios: {inside} inside of their bands, {outside} outside; {missing} missing; \
          {left_out} not compared"
     )];
-    if let Some(Session { load_average: load, machine, .. }) = session
-        && *load > 0.5 * machine.cores as f64
-    {
-        let cores = machine.cores;
-        notes.push(format!(
-            "the load was {load} on {cores} cores when it began: ratios need an idle machine"
-        ));
-    }
+    notes.extend(session.and_then(Session::disturbed));
     let columns = vec!["run", "quantity", "expected", "band", "measured", "verdict"];
     Table { columns, rows, notes, ..Table::default() }
 }

@@ -79,13 +79,15 @@ fn read(arguments: &Arguments) -> Result<Study, String> {
     let file = arguments.file.clone().unwrap_or_else(default);
     let mut study = Study::read(&file)?;
     study.only(&arguments.only).map_err(|why| format!("{}: {why}", file.display()))?;
-    let engines = distinct(&arguments.engine);
-    if !engines.is_empty() && (study.series.is_empty() || !study.row.is_empty()) {
+    if arguments.engine.is_empty() {
+        return Ok(study);
+    }
+    if study.series.is_empty() || !study.row.is_empty() {
         let why = "--engine is for series, and rows are judged of our mesher: name experiments with --only";
         return Err(format!("{}: {why}", file.display()));
     }
-    for series in study.series.iter_mut().filter(|_| !engines.is_empty()) {
-        series.engines = engines.iter().map(|name| name.to_string()).collect();
+    for series in &mut study.series {
+        series.engines = distinct(arguments.engine.clone());
     }
     Ok(study)
 }
@@ -193,15 +195,14 @@ pub(super) fn print_without(lines: &[Line]) -> bool {
 /// The table of targets, with the counts of the verdicts below it.
 fn targets(rows: &[Judged]) -> Table {
     use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
-    let number = |verdict: Verdict| rows.iter().filter(|row| row.verdict() == verdict).count();
-    let [met, missed, failed, left_out, others] =
-        [Met, Missed, Failed, LeftOut, ForComparison].map(number);
-    let count = format!(
-        "{met} met, {missed} missed, {failed} failed, {left_out} left out, {others} for comparison"
-    );
+    let count = |verdict: Verdict| {
+        let count = rows.iter().filter(|row| row.verdict() == verdict).count();
+        format!("{count} {}", verdict.words())
+    };
+    let counts = [Met, Missed, Failed, LeftOut, ForComparison].map(count).join(", ");
     let columns = vec!["row", "target", "measured", "how", "verdict"];
     let rows = rows.iter().map(|row| row.fields().to_vec()).collect();
-    Table { columns, rows, notes: vec![count], ..Table::default() }
+    Table { columns, rows, notes: vec![counts], ..Table::default() }
 }
 
 /// That table as a page, below a line about the machine and the counts.
@@ -217,7 +218,6 @@ fn is_result(line: &Line) -> bool {
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program
 /// in an experiment on a case.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
-    let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
     fn of_series(setup: &Setup) -> [&str; 3] {
         [&setup.engine, &setup.experiment, &setup.case]
@@ -229,20 +229,18 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
         Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != TARGETS),
         _ => None,
     });
-    if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
+    if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
     let without = left_out.find(|of| !runs.contains(of));
-    let why = match study.series.is_empty() {
-        true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured".to_owned(),
-        false if runs.is_empty() => {
+    let has_series = !study.series.is_empty();
+    let why = match without {
+        _ if !has_series && rows.iter().all(|row| row.measured.is_none()) => "no row was measured",
+        _ if has_series && runs.is_empty() => {
             "nothing was measured of the study: request fewer cells, or name another record"
-                .to_owned()
         }
-        _ => match without {
-            Some(of) => format!("nothing was measured of {}: the report says why", of.join(", ")),
-            None => return EXIT_HOLDS,
-        },
+        Some(of) => &format!("nothing was measured of {}: the report says why", of.join(", ")),
+        None => return EXIT_HOLDS,
     };
     eprintln!("harness: {why}");
     EXIT_MISSING

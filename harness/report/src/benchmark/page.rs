@@ -5,7 +5,7 @@ use super::groups::PROJECTED;
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure, page as whole_page};
-use bench::experiments::entry::{Entry, Line, Machine};
+use bench::experiments::entry::{Entry, Line, Machine, Session};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
 use maud::html;
@@ -88,16 +88,12 @@ pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {
     let unknown = || "machine, compiler or commit are missing in the record".to_owned();
     let is_unclean = machines.iter().any(|machine| machine.commit.ends_with("-dirty"));
     let unclean = || "a session ran with files that differ from its commit".to_owned();
-    let mut loads = lines.iter().filter_map(Line::session).map(|s| (s.load_average, &s.machine));
-    let disturbed = |(load, _)| {
-        format!("other processes may have disturbed a session, whose load average was {load:.1}")
-    };
     let rules = [
         (2, (failures > 0).then(failed)),
         (5, poor.iter().min().map(vague)),
         (9, is_unknown.then(unknown)),
         (9, is_unclean.then(unclean)),
-        (9, loads.find(|(load, machine)| *load > 0.5 * machine.cores as f64).map(disturbed)),
+        (9, lines.iter().filter_map(Line::session).find_map(Session::disturbed)),
     ];
     rules.into_iter().filter_map(|(rule, why)| Some((rule, why?))).collect()
 }
@@ -110,7 +106,7 @@ fn failures(lines: &[Line]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Comm, Session};
+    use bench::experiments::entry::Comm;
     use bench::testing::{line, run};
 
     fn session(load_average: f64, commit: &str) -> Line {
