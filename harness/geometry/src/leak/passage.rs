@@ -29,7 +29,7 @@ const PRECISION: f64 = 1.05;
 const SMALL: f64 = 0.015;
 /// Searches in which all places are measured. After them, and once a ball passes, so that no path leads through a wall, only the narrow
 /// places of the last path are, and the upper bound stays: along a slit that is equally wide everywhere, each search would otherwise lead to
-/// the next place.
+/// the next place. Ten times as many are the most, once a ball passes.
 const SEARCHES_MAX: usize = 30;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
@@ -175,7 +175,7 @@ impl Search<'_> {
                 bound = Some(way.bound);
                 self.keep_near(&way, &cells);
             }
-            if !self.divide(&way) {
+            if searches >= 10 * SEARCHES_MAX && way.passing() > 0.0 || !self.divide(&way) {
                 return Ok(Way { bound: bound.unwrap_or(way.bound), ..way });
             }
         }
@@ -183,9 +183,9 @@ impl Search<'_> {
 
     /// Closes all cells that may be narrow, except those of a path and near its narrow places, so that only these are measured further.
     fn keep_near(&mut self, way: &Way, cells: &[u32]) {
-        let (near, wanted) = (way.near(), way.wanted());
+        let near = way.near();
         for (i, cell) in (0..).zip(&mut self.space.cells) {
-            cell.is_open &= cell.shown() >= wanted || near(cell) || cells.contains(&i);
+            cell.is_open &= cell.shown() >= way.wanted() || near(cell) || cells.contains(&i);
         }
     }
 
