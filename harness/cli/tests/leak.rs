@@ -62,7 +62,7 @@ impl Fixture {
         for (level, spacing) in (0..).zip(SPACINGS) {
             let tree = fixture.path(spacing);
             fs::create_dir(&tree).unwrap();
-            leaf_set(vec![base_tree(&case.facets_lattice, level)]).write(&tree).unwrap();
+            leaf_set(vec![base_tree(&case.facets_lattice, |_| level)]).write(&tree).unwrap();
         }
         let mesher = fixture.path("mesher");
         fs::write(&mesher, MESHER).unwrap();

@@ -34,7 +34,7 @@ impl Fixture {
         let fixture = Self(tempfile::tempdir().unwrap());
         fs::write(fixture.path("case.toml"), CASE).unwrap();
         let case = Case::read(&fixture.path("case.toml")).unwrap();
-        let words = base_tree(&case.facets_lattice, case.level_surface);
+        let words = base_tree(&case.facets_lattice, |_| case.level_surface);
         let (half, rest) = words.split_at(words.len() / 2);
         let empty = case.manifest(Tree::Base, "test".to_owned());
         let set = LeafSet::new(empty, Vec::new()).with_parts(vec![half.to_vec(), rest.to_vec()]);

@@ -35,13 +35,14 @@ pub fn words_with_sides(
     words
 }
 
-/// The base tree of facets at a surface level without boxes. All leaves that no facet crosses are outside.
-pub fn base_tree(facets: &[FacetLattice], level: u8) -> Vec<u64> {
-    fn refine(octant: Octant, facets: &[Triangle], level: u8, words: &mut Vec<u64>) {
+/// The base tree of facets at the surface level of each octant, which boxes may raise. All leaves that no facet crosses are outside.
+pub fn base_tree(facets: &[FacetLattice], level: impl Fn(&Octant) -> u8) -> Vec<u64> {
+    type Level<'a> = &'a dyn Fn(&Octant) -> u8;
+    fn refine(octant: Octant, facets: &[Triangle], level: Level, words: &mut Vec<u64>) {
         let (low, high) = octant.bounds();
         let crossing: Vec<Triangle> =
             facets.iter().filter(|f| f.meets(low, high)).cloned().collect();
-        if !crossing.is_empty() && octant.level < level {
+        if !crossing.is_empty() && octant.level < level(&octant) {
             return (0..8).for_each(|d| refine(octant.child(d), &crossing, level, words));
         }
         let side = if crossing.is_empty() { Side::Outside } else { Side::Crossing };
@@ -49,7 +50,7 @@ pub fn base_tree(facets: &[FacetLattice], level: u8) -> Vec<u64> {
     }
     let facets: Vec<Triangle> = facets.iter().map(Triangle::new).collect();
     let mut words = Vec::new();
-    refine(Octant::ROOT, &facets, level, &mut words);
+    refine(Octant::ROOT, &facets, &level, &mut words);
     words
 }
 
@@ -155,7 +156,7 @@ mod tests {
         let side = |o: &Octant| if crosses(o) { Side::Crossing } else { Side::Outside };
         for level in 0..4 {
             let expected = words_with_sides(|o| o.level < level && crosses(o), |o| Some(side(o)));
-            assert_eq!(base_tree(&[facet], level), expected);
+            assert_eq!(base_tree(&[facet], |_| level), expected);
             assert!(expected.len() > 7 * usize::from(level), "level {level}");
         }
     }

@@ -220,7 +220,7 @@ mod tests {
         let inner = cuboid([[51, 102], [53, 101], [52, 111]]);
         for (outer, enclosed) in [([14, 146], true), ([-14, 174], false)] {
             let body = [&inner[..], &cuboid([outer; 3])].concat();
-            let words = contract::testing::base_tree(&body, 4);
+            let words = contract::testing::base_tree(&body, |_| 4);
             let mut terms = contract::testing::leaf_set(vec![]).manifest;
             let of_cavity = |terms: &Manifest| {
                 let cavity = leaf_at(&words, [8 * CELL; 3]).unwrap() as u32;
@@ -245,7 +245,7 @@ mod tests {
         for twice in 0..=6 {
             let faces = cuboid([[33, 97], [35, 111], [31, 96]]);
             let body = [&faces[..], &faces[..2 * twice]].concat();
-            let words = contract::testing::base_tree(&body, 4);
+            let words = contract::testing::base_tree(&body, |_| 4);
             let found = find(&words, &terms, &body);
             let within = leaf_at(&words, [6 * CELL; 3]).unwrap() as u32;
             let component = found.iter().find(|c| c.leaves.contains(&within)).unwrap();

@@ -125,7 +125,7 @@ mod tests {
         facets.remove(77);
         let text = "spacing_min = 0.015625\n[root]\norigin = [-0.99, -1.03, -1.01]\nedge = 2.0";
         let case = Case::from_parts(text, facets).unwrap();
-        let tree = |level| Ok::<_, Failure>(base_tree(&case.facets_lattice, level));
+        let tree = |level| Ok::<_, Failure>(base_tree(&case.facets_lattice, |_| level));
         let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
         let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
         let passage = report.passage.unwrap();

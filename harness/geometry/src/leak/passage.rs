@@ -112,15 +112,15 @@ pub fn widest(
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
     let ends = (before[before.len() - 1], after.last().copied());
     let mut search = Search { space, ends, watch };
-    let leaf = UNITS_PER_EDGE as f64 / f64::from(1u32 << level);
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
-        let before = way.clearance();
-        if before > 3f64.sqrt() * leaf || !search.open_near(&way, leaf) {
+        let Place { at, clearance, .. } = way.points[way.narrowest()];
+        let leaf = search.space.leaf_of_facet(at, clearance);
+        if clearance > 3f64.sqrt() * leaf || !search.open_near(&way, leaf) {
             break;
         }
         way = search.converge()?;
-        if way.clearance() < PRECISION * before {
+        if way.clearance() < PRECISION * clearance {
             break;
         }
     }

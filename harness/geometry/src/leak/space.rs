@@ -13,6 +13,7 @@ use contract::failure::{Result, Watch};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, KEY_END, Order, Side};
+use parry3d_f64::query::PointQuery as _;
 
 /// A cell; lengths are in lattice units.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +64,8 @@ pub struct Space<'a> {
     order: BTreeMap<u128, u32>,
     /// The facets of the case.
     pub facets: &'a FacetTree,
+    /// The words of the base tree.
+    words: &'a [u64],
     /// The far field is the part of the root's boundary that is outside in the base tree of these words, and all of it without them.
     outside: Option<&'a [u64]>,
 }
@@ -74,7 +77,7 @@ impl<'a> Space<'a> {
     /// # Errors
     /// One sentence, if the words are not leaves that tile the root.
     pub fn new(
-        words: &[u64],
+        words: &'a [u64],
         facets: &'a FacetTree,
         outside: Option<&'a [u64]>,
     ) -> Result<Self, String> {
@@ -92,7 +95,14 @@ impl<'a> Space<'a> {
         };
         let cells: Vec<Cell> = words.iter().map(cell).collect();
         let order = cells.iter().zip(0..).map(|(cell, i)| (key(cell.low), i)).collect();
-        Ok(Self { cells, order, facets, outside })
+        Ok(Self { cells, order, facets, words, outside })
+    }
+
+    /// The edge of the leaf that the nearest point of a facet is in: around a place in a box, one of the box.
+    pub fn leaf_of_facet(&self, at: Point, distance: f64) -> f64 {
+        let nearest = self.facets.triangle(self.facets.within(at, 1.05 * distance)[0]);
+        let leaf = leaf_at(self.words, nearest.project_local_point(at, true).point);
+        UNITS_PER_EDGE as f64 / f64::from(1u32 << word::level(leaf))
     }
 
     fn is_far(&self, cell: u32) -> bool {

@@ -4,7 +4,8 @@ mod openings;
 
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result, Watch};
-use contract::lattice::Root;
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::octant::Octant;
 use contract::testing::{assert_text, base_tree};
 use geometry::leak::Leaks;
 use geometry::leak::Target;
@@ -41,7 +42,8 @@ fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report> {
 }
 
 fn answers(case: &Case, ends: ([f64; 3], Target)) -> Result<Answers> {
-    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), &Silent)?.answers(&[ends])
+    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, |_| level)), &Silent)?
+        .answers(&[ends])
 }
 
 fn from_centre(facets: &[Facet], level: u8) -> Report {
@@ -189,6 +191,32 @@ fn the_answer_is_the_expected_text() {
     assert_text(&all.map(one).concat(), "tests/leak/expected.txt");
 }
 
+/// Of the leaves that facets cross, only those of the box are opened: wide balls would seem to pass the wall in the others.
+#[test]
+fn an_opening_in_a_finer_box_is_measured_and_no_spacing_closes_it() {
+    let body = hole(0.05);
+    let case = case(&body.facets, 5);
+    let units = |at: f64, axis: usize| {
+        ((at - ROOT.origin[axis]) / ROOT.edge * UNITS_PER_EDGE as f64) as i64
+    };
+    let [low, high] =
+        [-0.2, 0.2].map(|by| [units(0.13 + by, 0), units(-0.21 + by, 1), units(1.0 + by, 2)]);
+    let is_in_box = |octant: &Octant| {
+        let (begin, end) = octant.bounds();
+        (0..3).all(|a| begin[a] < high[a] && low[a] < end[a])
+    };
+    let tree = |level| {
+        let level = |octant: &Octant| if is_in_box(octant) { 10 } else { level };
+        Ok(base_tree(&case.facets_lattice, level))
+    };
+    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+    let answers = leaks.answers(&[([0.13, -0.21, 0.9], Target::Far)]).unwrap();
+    let report = &answers.examined[0];
+    assert!(report.is_leak && report.closes.is_none(), "{report}");
+    assert!(!report.to_string().contains("Spacings above"), "{report}");
+    assert_describes(report, &body, "a box");
+}
+
 #[test]
 fn a_closed_body_does_not_leak() {
     let body = missing_facet(77);
@@ -206,7 +234,7 @@ fn a_closed_body_does_not_leak() {
 fn a_coarser_base_tree_that_cannot_be_meshed_is_no_answer() {
     let case = case(&bodies()[0].facets, 8);
     let tree = |level| match level {
-        8 => Ok(base_tree(&case.facets_lattice, level)),
+        8 => Ok(base_tree(&case.facets_lattice, |_| level)),
         _ => Err(Failure::input(format!("no memory for level {level}"))),
     };
     let ends = [([0.0; 3], Target::Far)];
