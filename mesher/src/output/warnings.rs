@@ -63,7 +63,7 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     let end = if has_seeds { "to" } else { "from" };
     Some(format!(
         "the geometry leaks: a region with a volume of {volume:.4e} at ({x}, {y}, {z}), {before} at a spacing of {spacing_coarse}, became \
-         {after} at {spacing_fine}: close what `harness leak {case_name} --{end} {x},{y},{z}` finds, or increase spacing_min"
+         {after} at {spacing_fine}: close what `harness leak {case_name} --{end} {x},{y},{z}` finds, or increase the spacing there (spacing_min, or that of a box)"
     ))
 }
 
