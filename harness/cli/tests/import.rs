@@ -162,6 +162,8 @@ fn unusable_input_is_one_sentence_with_the_file() {
     assert!(
         refused(&[&sample("brick.csv"), "--root", "0,0,0,0"]).contains("edge that is positive")
     );
+    // A manifest with this root could not be read.
+    assert!(refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,1e200"]).contains("to 1e100"));
     assert!(refused(&[&sample("brick.csv"), "--format", "p4est"]).contains("p8est"));
 }
 
