@@ -62,7 +62,7 @@ impl AuditReport {
 
     /// Whether any property of the leaves was checked, beyond their files and counts.
     pub fn checked_anything(&self) -> bool {
-        let formal = [checks::FILES, checks::manifest::NAME, "linear"];
+        let formal = [checks::FILES, checks::manifest::NAME, "linear", TREE];
         self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
     }
 
@@ -134,6 +134,7 @@ fn audit_within(most: usize, dir: &Path, case: Option<&Case>, promises: &Promise
             if manifest.tree == Kind::Base && case.is_some_and(|case| case.tree == Kind::Final) {
                 files.report("mesh.json states the tree \"base\": T0, which is not the final mesh");
             }
+            files.needs_objects("mesh.json names no file of leaves");
             let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
             let beside_parts = tree.filter(|_| mesh.tree_file.is_none());

@@ -181,6 +181,16 @@ fn a_report_that_contradicts_itself_is_a_bug() {
     }
 }
 
+#[test]
+fn a_manifest_that_names_no_file_gives_no_check_anything_to_check() {
+    let promises = Promises { balance: Some(Touching::Face), ..Promises::default() };
+    let dir = tempfile::tempdir().unwrap();
+    leaf_set(vec![]).write(dir.path()).unwrap();
+    let report = audit_against(dir.path(), None, &promises);
+    assert!(report.holds() && report.not_run().count() == report.checks.len(), "{report}");
+    assert!(report.to_string().contains("mesh.json names no file of leaves"), "{report}");
+}
+
 /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
 #[test]
 fn an_exceeded_memory_limit_is_a_finding() {
@@ -299,6 +309,13 @@ fn a_tree_beside_parts_must_have_their_leaves() {
     assert!(text.ends_with(&other.manifest.digest.to_string()), "{text}");
     let (_, text) = tree_file(&correct, &bytes[..bytes.len() / 2]);
     assert!(text.contains(TREE_FILE) && text.contains("is damaged"), "{text}");
+    // That both have the same leaves shows nothing about them.
+    let dir = tempfile::tempdir().unwrap();
+    correct.write(dir.path()).unwrap();
+    std::fs::write(dir.path().join(TREE_FILE), &bytes).unwrap();
+    let boxes = Promises { boxes: true, ..Promises::default() };
+    let report = audit_against(dir.path(), None, &boxes);
+    assert!(report.holds() && !report.checked_anything(), "{report}");
 }
 
 #[test]
