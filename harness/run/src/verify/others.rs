@@ -9,7 +9,7 @@ use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::layout::{self, SERIAL};
 use crate::engine::process::{self, Watch};
 use crate::python::{ORACLES, ask};
-use check::checks::{CheckResult, identical};
+use check::checks::{CheckResult, NO_LEAVES, identical};
 use check::oracle::vote::{Answer, Ballot};
 use check::oracle::{self, Sample, is_doubled, is_watertight};
 use contract::case::Case;
@@ -173,6 +173,7 @@ pub fn proven(
         }
         Err(failure) => return Err(failure),
     }
+    proof.needs_objects(NO_LEAVES);
     Ok(proof)
 }
 
