@@ -305,6 +305,21 @@ fn a_case_on_which_nothing_was_checked_is_not_green() {
     assert!(outcome.printed.contains("no case in "), "{}", outcome.printed);
 }
 
+/// Of ranks that stay, no other memory is measured.
+#[test]
+fn the_memory_of_rank_0_is_not_that_of_all_ranks() {
+    let fixture = Fixture::new();
+    fixture.script_mpirun();
+    fixture.script("mesher", &HOLDS.replace("\"ranks\": %s", "\"other\": %s"));
+    let outcome = fixture.verify(&["--json", "report.json"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
+    let runs = json["cases"][0]["runs"].as_array().unwrap();
+    let on_ranks: Vec<_> = runs.iter().filter(|run| !run["layout"].is_null()).collect();
+    assert_eq!(on_ranks.len(), 2);
+    assert!(on_ranks.iter().all(|run| run["peak_rss_bytes"].is_null()), "{runs:?}");
+}
+
 #[test]
 fn a_run_report_that_contradicts_the_mesh_is_detected() {
     let fixture = Fixture::new();

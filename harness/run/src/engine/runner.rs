@@ -213,8 +213,8 @@ impl Engine {
         Ok(mesh)
     }
 
-    /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside where the program
-    /// reported none, or that of rank 0 alone.
+    /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside, if it was, where
+    /// the program reported none, or that of rank 0 alone.
     fn report(
         &self,
         written: Option<&Mesh>,
@@ -252,10 +252,8 @@ impl Engine {
             ));
         }
         let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
-        if let Some(peak) = finished.peak_rss_bytes
-            && (is_of_one || report.peak_rss_bytes.is_empty())
-        {
-            report.peak_rss_bytes = vec![peak];
+        if is_of_one || report.peak_rss_bytes.is_empty() {
+            report.peak_rss_bytes = finished.peak_rss_bytes.into_iter().collect();
         }
         Ok(report)
     }
