@@ -320,6 +320,37 @@ fn the_memory_of_rank_0_is_not_that_of_all_ranks() {
     assert!(on_ranks.iter().all(|run| run["peak_rss_bytes"].is_null()), "{runs:?}");
 }
 
+/// An engine that reads binary STL files only, and whose arrays have names of their own, or that keeps the outside only.
+#[test]
+fn the_comparison_with_p4est_is_made_with_what_the_engine_takes_and_writes() {
+    let fixture = Fixture::new();
+    let balances =
+        "test -f \"$1/leaves-00000.npy\" && cp \"${0%/*}/other/leaves-00000.npy\" \"$2\"";
+    fixture.script("p4est", balances);
+    let engine = "[run]\nserial = [\"{here}/mesher\", \"{case}\"]\nout = [\"--out\", \"{out}\"]\n\
+                  json = [\"--json\", \"{json}\"]\nungraded = [\"--ungraded\"]\n[takes]\n";
+    let renamed = "[ -z \"$out\" ] || { mv \"$out/leaves-00000.npy\" \"$out/words.npy\"\n\
+                   sed -i 's/leaves-00000/words/; s/\"keep\":\"all\"/\"keep\":\"'$keep'\"/' \"$out/mesh.json\"; }";
+    let case = fixture.read("case.toml");
+    for (keep, takes, refuses, outcome) in [
+        ("all", "stl = \"binary\"", "! grep -q '^solid' \"${1%/*}/body.stl\"", "pass"),
+        ("outside", "keep = [\"outside\"]", "! grep -q '^keep = \"all\"' \"$1\"", "left_out"),
+    ] {
+        fixture.write("case.toml", &case.replace("\"all\"", &format!("\"{keep}\"")));
+        fixture.write("engine.toml", &format!("{engine}{takes}\n"));
+        fixture.script("mesher", &format!("{refuses} || exit 2\nkeep={keep}{HOLDS}\n{renamed}"));
+        let options = ["--engine", "engine.toml", "--json", "report.json"];
+        let verified = fixture.harness(&[&["verify", "case.toml"], &options[..]].concat());
+        assert_eq!(verified.code, 0, "{}", verified.printed);
+        let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
+        let checks = json["cases"][0]["checks"].as_array().unwrap();
+        let by_p4est = checks.iter().find(|check| check["subject"] == "p4est").unwrap();
+        assert_eq!(by_p4est["outcome"], outcome, "{by_p4est}");
+        let why = by_p4est["why"].as_str().unwrap_or_default();
+        assert!(outcome == "pass" || why.contains("does not support keep = all"), "{why}");
+    }
+}
+
 #[test]
 fn a_run_report_that_contradicts_the_mesh_is_detected() {
     let fixture = Fixture::new();
