@@ -127,9 +127,35 @@ fn two_reports_in_one_file_are_invalid_input() {
     let fixture = Fixture::new();
     let file = fixture.path("report");
     let file = file.to_str().unwrap();
-    let outcome = fixture.verify(&["--no-mpi", "--json", file, "--junit", file]);
+    fs::create_dir(fixture.path("out")).unwrap();
+    let within = ["--out", "out", "--junit", "out/report.json"];
+    for options in [&["--json", file, "--junit", file][..], &within] {
+        let outcome = fixture.verify(&[&["--no-mpi"], options].concat());
+        assert_eq!(outcome.code, 2, "{}", outcome.printed);
+        assert!(outcome.printed.contains("this run also writes"), "{}", outcome.printed);
+    }
+}
+
+#[test]
+fn a_summary_that_cannot_be_written_is_named() {
+    let fixture = Fixture::new();
+    fs::create_dir(fixture.path("summary.md")).unwrap();
+    let outcome = fixture.verify(&["--no-mpi"]);
     assert_eq!(outcome.code, 2, "{}", outcome.printed);
-    assert!(outcome.printed.contains("this run also writes"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("could not be written: /"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("summary.md: "), "{}", outcome.printed);
+}
+
+/// What is in the way of the second case is found before the first.
+#[test]
+fn a_directory_of_something_else_is_refused_before_the_first_case() {
+    let fixture = Fixture::new();
+    fixture.write("other.toml", &fixture.read("case.toml"));
+    fixture.write("out/other/precious", "");
+    let outcome = fixture.verify(&["other.toml", "--no-mpi", "--out", "out"]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("no verification made it"), "{}", outcome.printed);
+    assert!(!fixture.path("out/case").exists() && fixture.path("out/other/precious").exists());
 }
 
 #[test]
