@@ -153,14 +153,20 @@ impl Engine {
         PlainCase::read(case)?.write(directory, takes.stl).map_err(|error| error.to_string())
     }
 
-    /// The command of a run.
+    /// The values of the placeholders that do not depend on a run.
+    fn values(&self) -> Values<'static> {
+        let program = self.program.to_string_lossy().into_owned();
+        self.places.clone().into_iter().chain([("program", program)]).collect()
+    }
+
+    /// The command of a run. What it writes in a format of its own has an empty place afterwards.
     ///
     /// # Errors
     /// [`End::Missing`] if the engine file has no template for it.
     pub fn command(&self, case: &Path, layout: &Layout, options: &RunOptions) -> Result<Command> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
-        let mut values = self.places.clone();
-        values.extend([("program", text(&self.program)), ("case", text(case))]);
+        let mut values = self.values();
+        values.insert("case", text(case));
         let templates = &self.description.run;
         let out = self.mesh_path(options).map(|mesh| match templates.format {
             Some(_) => text(&import::foreign(options.place)),
@@ -304,7 +310,9 @@ impl Engine {
         let serve = Some(&self.description.run.serve).filter(|serve| !serve.is_empty())?;
         let start = move || {
             let (mut command, shared) = self.launcher.command(count, &self.program);
-            command.args(serve);
+            let mut values = self.values();
+            values.insert("ranks", count.to_string());
+            command.args(serve.iter().map(|word| fill(word, &values)));
             (command, shared)
         };
         Some((format!("{} on {count} ranks", self.program.display()), start))
@@ -426,6 +434,17 @@ mod tests {
         assert_eq!(words(&mesher, &on_mpi, &files), expected);
         let reference = "reference a.toml --out mesh --ungraded";
         assert_eq!(words(&programs.reference, &on_serial(&simulated), &files), reference);
+    }
+
+    #[test]
+    fn the_words_that_make_ranks_stay_are_filled_in() {
+        let programs = Programs::find("mesher", &Default::default()).unwrap();
+        let mut engine = programs.mesher;
+        engine.description.run.serve = vec!["--serve".into(), "{program} on {ranks}".into()];
+        let (_, start) = engine.service(3).unwrap();
+        let (command, _) = start();
+        let last = format!("{} on 3", engine.program.display());
+        assert_eq!(command.get_args().last().unwrap().to_str(), Some(&*last));
     }
 
     /// The same choices, serially: the reference does not offer them.
