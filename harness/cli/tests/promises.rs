@@ -325,6 +325,25 @@ fn an_engine_in_a_format_of_its_own_needs_neither_digest_nor_ranks() {
     assert!(refused.printed.contains(why), "{}", refused.printed);
 }
 
+/// A run without a run report writes its mesh, also where its instructions are counted.
+#[test]
+fn instructions_are_counted_of_an_engine_in_a_format_of_its_own() {
+    let fixture = Fixture::new();
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"instructions\"]\n");
+    copying(&fixture, "unitcube");
+    fixture.write("forest.toml", &FOREST.replace("json = [\"{json}\"]\n", ""));
+    let gate = "gate --engine forest.toml --rules gate.toml";
+    let counted = fixture.harness(gate);
+    let is_left_out = counted.printed.contains("valgrind is not on the PATH");
+    assert!(counted.code == 0 || is_left_out, "{}", counted.printed);
+    // A failure of valgrind alone is called so.
+    fixture.write("forest.toml", FOREST);
+    fixture.script("bin/valgrind", "#!/bin/sh\necho out of order >&2\nexit 9\n");
+    let failed = fixture.harness(gate);
+    let why = "valgrind ended with code 9: out of order";
+    assert!(failed.printed.contains(why), "{}", failed.printed);
+}
+
 #[test]
 fn promises_can_be_given_on_the_command_line() {
     let fixture = Fixture::new();

@@ -162,13 +162,17 @@ impl Engine {
     /// The command of a run. What it writes in a format of its own has an empty place afterwards.
     ///
     /// # Errors
-    /// [`End::Missing`] if the engine file has no template for it.
+    /// [`End::Missing`] if the engine file has no template for it; another end if there is no such place.
     pub fn command(&self, case: &Path, layout: &Layout, options: &RunOptions) -> Result<Command> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut values = self.values();
         values.insert("case", text(case));
         let templates = &self.description.run;
-        let out = self.mesh_path(options).map(|mesh| match templates.format {
+        let mesh = self.mesh_path(options);
+        if let (Some(mesh), Some(_)) = (&mesh, templates.format) {
+            import::clear(options.place, mesh)?;
+        }
+        let out = mesh.map(|mesh| match templates.format {
             Some(_) => text(&import::foreign(options.place)),
             None => text(&mesh),
         });
@@ -189,9 +193,6 @@ impl Engine {
         let mesh = self.mesh_path(options);
         // An earlier run's files must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
-        if let (Some(mesh), Some(_)) = (&mesh, self.description.run.format) {
-            import::clear(options.place, mesh)?;
-        }
         let finished = self.drive(&mut command, layout.ranks, options)?;
         let written = mesh.as_deref().map(|mesh| {
             import::complete(&self.description, self.label(), &command, case, mesh, options)
