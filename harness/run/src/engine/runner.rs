@@ -17,7 +17,7 @@ use contract::plain::{PlainCase, StlForm};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
@@ -59,8 +59,8 @@ impl Engine {
         }
         let places = description.places(paths);
         let program = match given {
-            // A name without a slash would be searched for on the PATH.
-            Some(given) => fs::canonicalize(given).unwrap_or_else(|_| given.to_owned()),
+            // A name without a slash would be searched for on the PATH. A link may lead to a program that behaves by its own name.
+            Some(given) => path::absolute(given).unwrap_or_else(|_| given.to_owned()),
             None => {
                 let program = fill(&description.program, &places);
                 let found = (!program.contains('/')).then(|| on_path(&program)).flatten();
