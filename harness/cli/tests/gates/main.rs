@@ -246,6 +246,10 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     for wrong in ["words=1", "case/words=1e200", "case/words=nan", "case/x=5 --value case/x=7"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
     }
+    // Options that would have no effect, and an address that is the same for all commits.
+    for unused in ["--commit HEAD", "--repository .", "--link x/{commit}", "--page p --link x"] {
+        assert_eq!(fixture.harness(&format!("track history.jsonl {unused}")).code, 2, "{unused}");
+    }
     let series = fs::read_to_string(fixture.path("trend.json")).unwrap();
     assert!(series.contains("\"first_new\"") && series.contains("44.0"), "{series}");
     assert!(fs::read_to_string(fixture.path("trend.html")).unwrap().contains("commit-10"));
