@@ -254,6 +254,8 @@ fn the_balance_across_a_tree_edge_is_a_finding_and_that_of_faces_holds() {
     );
     assert_eq!(printed_by(&["audit", &edge, "--balance", "edges"]).0, 1);
     assert_eq!(printed_by(&["audit", &edge, "--balance", "faces"]).0, 0);
+    let (code, _, error) = result(&["audit", &edge, "--balance", "faces", "--position", "centre"]);
+    assert!(code == 2 && error.contains("the position of cells is for tables"), "{error}");
     assert_eq!(printed_by(&["audit", &repaired]).0, 0);
     let (code, printed) = printed_by(&["diff", &edge, &repaired]);
     let finding = "A has tree 1, quadrant 0 (level 0 at 0, 0, 0), B has tree 1, quadrant 0 (level 2 at 0, 0, 0)";
