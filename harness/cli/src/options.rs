@@ -60,7 +60,8 @@ pub fn read_case(name: &str) -> Result<Case> {
 pub fn root(text: &str) -> Result<Root, String> {
     let [x, y, z, edge] = numbers(text, "X,Y,Z,EDGE")?;
     let root = Root { origin: [x, y, z], edge };
-    root.is_cube().then_some(root).ok_or_else(|| "give an edge that is positive".to_owned())
+    let why = "give an edge that is positive, from 1e-100 to 1e100";
+    root.is_cube().then_some(root).ok_or_else(|| why.to_owned())
 }
 
 /// The program under test.
@@ -221,7 +222,7 @@ mod tests {
     #[test]
     fn a_root_has_an_edge_that_is_positive() {
         assert_eq!(root("-1,0,2,4"), Ok(Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 }));
-        for wrong in ["0,0,0,0", "0,0,0,-1", "0,0,0,inf", "0,0,0"] {
+        for wrong in ["0,0,0,0", "0,0,0,-1", "0,0,0,inf", "0,0,0", "0,0,0,1e100", "1e100,0,0,1"] {
             assert!(root(wrong).is_err(), "{wrong}");
         }
     }

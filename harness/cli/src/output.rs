@@ -90,8 +90,9 @@ pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8> 
         }
         let page = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty());
         if let (Some(page), Some(text)) = (page, summary) {
-            let mut file = OpenOptions::new().create(true).append(true).open(page)?;
-            file.write_all(text.as_bytes())?;
+            let opened = OpenOptions::new().create(true).append(true).open(&page);
+            let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
+            written.map_err(|error| Failure::at(Path::new(&page), error))?;
         }
         Ok(())
     };

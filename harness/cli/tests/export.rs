@@ -256,7 +256,7 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
             "case.toml",
             "a digest is 32 lower-case",
         ),
-        (stated.replace(&digest, &"1".repeat(32)), "case.toml", "and its manifest states 1111"),
+        (stated.replace(&digest, &"1".repeat(32)), "case.toml", "mesh: its leaves have the digest"),
     ] {
         fs::write(&manifest, manifest_text).unwrap();
         let (code, output, error) = export(&place, "case/constant/polyMesh", &["--case", case]);

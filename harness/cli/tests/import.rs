@@ -162,6 +162,8 @@ fn unusable_input_is_one_sentence_with_the_file() {
     assert!(
         refused(&[&sample("brick.csv"), "--root", "0,0,0,0"]).contains("edge that is positive")
     );
+    // A manifest with this root could not be read.
+    assert!(refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,1e200"]).contains("to 1e100"));
     assert!(refused(&[&sample("brick.csv"), "--format", "p4est"]).contains("p8est"));
 }
 
@@ -204,14 +206,14 @@ fn a_proof_is_part_of_an_audit() {
     let path = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
     let [mesh, checker, json] = ["mesh", "checker", "audit.json"].map(path);
     assert_eq!(result(&["import", &sample("unitcube.p8est"), "--out", &mesh]).0, 0);
-    let audit = || {
+    let audit = |mesh: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.args(["audit", &mesh, "--proved", &mesh, "--json", &json]);
+        command.args(["audit", mesh, "--proved", mesh, "--json", &json]);
         let output = command.env("HARNESS_PROVEN", &checker).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         (output.status.code().unwrap(), text(output.stdout) + &text(output.stderr))
     };
-    let (code, printed) = audit();
+    let (code, printed) = audit(&mesh);
     assert!(code == 3 && printed.contains("ci/prove"), "{printed}");
     for (ends, expected, says) in [
         ("echo accepted; echo proven, given T0", 0, "proven, given T0"),
@@ -222,12 +224,22 @@ fn a_proof_is_part_of_an_audit() {
     ] {
         fs::write(&checker, format!("#!/bin/sh\n{ends}\n")).unwrap();
         fs::set_permissions(&checker, fs::Permissions::from_mode(0o755)).unwrap();
-        let (code, printed) = audit();
+        let (code, printed) = audit(&mesh);
         assert!(code == expected && printed.contains(says), "{ends}: {code} {printed}");
         let record: serde_json::Value =
             serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
         assert_eq!(record["holds"], code != 1, "{ends}");
     }
+    // Nothing is proven of a mesh without leaves, and a report that cannot be written hides no finding.
+    let [words, empty] = ["words.npy", "empty"].map(path);
+    contract::npy::write(Path::new(&words), &[]).unwrap();
+    assert_eq!(result(&["import", &words, "--root", "0,0,0,8", "--out", &empty]).0, 0);
+    fs::write(&checker, "#!/bin/sh\necho accepted; echo proven, given T0\n").unwrap();
+    let (code, printed) = audit(&empty);
+    let says = printed.contains("proof      nothing to check: the mesh has no leaves");
+    assert!(code == 1 && says, "{code} {printed}");
+    let (code, printed) = printed_by(&["audit", &empty, "--json", "/dev/full"]);
+    assert!(code == 1 && printed.contains("a report could not be written: /dev/full"), "{printed}");
 }
 
 /// p4est's issue 238: two cubes that share an edge.
@@ -242,6 +254,8 @@ fn the_balance_across_a_tree_edge_is_a_finding_and_that_of_faces_holds() {
     );
     assert_eq!(printed_by(&["audit", &edge, "--balance", "edges"]).0, 1);
     assert_eq!(printed_by(&["audit", &edge, "--balance", "faces"]).0, 0);
+    let (code, _, error) = result(&["audit", &edge, "--balance", "faces", "--position", "centre"]);
+    assert!(code == 2 && error.contains("the position of cells is for tables"), "{error}");
     assert_eq!(printed_by(&["audit", &repaired]).0, 0);
     let (code, printed) = printed_by(&["diff", &edge, &repaired]);
     let finding = "A has tree 1, quadrant 0 (level 0 at 0, 0, 0), B has tree 1, quadrant 0 (level 2 at 0, 0, 0)";

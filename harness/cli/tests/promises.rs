@@ -325,6 +325,53 @@ fn an_engine_in_a_format_of_its_own_needs_neither_digest_nor_ranks() {
     assert!(refused.printed.contains(why), "{}", refused.printed);
 }
 
+/// A run without a run report writes its mesh, also where its instructions are counted.
+#[test]
+fn instructions_are_counted_of_an_engine_in_a_format_of_its_own() {
+    let fixture = Fixture::new();
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"instructions\"]\n");
+    copying(&fixture, "unitcube");
+    fixture.write("forest.toml", &FOREST.replace("json = [\"{json}\"]\n", ""));
+    let gate = "gate --engine forest.toml --rules gate.toml";
+    let counted = fixture.harness(gate);
+    let is_left_out = counted.printed.contains("valgrind is not on the PATH");
+    assert!(counted.code == 0 || is_left_out, "{}", counted.printed);
+    // A failure of valgrind alone is called so.
+    fixture.write("forest.toml", FOREST);
+    fixture.script("bin/valgrind", "#!/bin/sh\necho out of order >&2\nexit 9\n");
+    let failed = fixture.harness(gate);
+    let why = "valgrind ended with code 9: out of order";
+    assert!(failed.printed.contains(why), "{}", failed.printed);
+}
+
+/// Its name in results is the path, and the files of its runs lie with all others.
+#[test]
+fn an_engine_file_may_have_the_name_of_ours() {
+    let fixture = Fixture::new();
+    fixture.engine("right", "complete = true");
+    let engine = RUN.replace("{here}/engine", "{here}/../engine");
+    fixture.write("own/mesher.toml", &format!("{engine}[promises]\ncomplete = true\n"));
+    let absolute = fixture.path("own/mesher.toml");
+    for name in ["own/mesher.toml", absolute.to_str().unwrap()] {
+        let verify = format!("verify case.toml --engine {name} --reference ./engine --no-mpi");
+        let outcome = fixture.harness(&verify);
+        assert_eq!(outcome.code, 0, "{}", outcome.printed);
+        assert_eq!(fs::read_dir(fixture.path("own")).unwrap().count(), 1, "{name}");
+    }
+}
+
+/// As the interpreter of a virtual environment, which is a link to that of the system.
+#[test]
+fn a_program_that_is_a_link_is_started_under_its_own_name() {
+    let fixture = Fixture::new();
+    fixture.engine("right", "complete = true");
+    let by_name = ENGINE.replace("here=", "[ \"${0##*/}\" = alias ] || exit 9\nhere=");
+    fixture.script("engine", &by_name);
+    std::os::unix::fs::symlink("engine", fixture.path("alias")).unwrap();
+    let outcome = fixture.verify("--no-mpi --mesher alias");
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+}
+
 #[test]
 fn promises_can_be_given_on_the_command_line() {
     let fixture = Fixture::new();

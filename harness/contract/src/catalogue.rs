@@ -5,7 +5,7 @@ use crate::number::numbered;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, absolute};
 
 /// Size class of a case in the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -65,8 +65,9 @@ impl Catalogue {
             let mut case = match is_path(argument) {
                 // A missing geometry is an error of a user's own case, and not a reason to leave it out.
                 true => {
-                    let path =
-                        fs::canonicalize(argument).map_err(|e| format!("{argument}: {e}"))?;
+                    // Its geometry is beside the link, if it is one.
+                    let path = fs::metadata(argument).and_then(|_| absolute(argument));
+                    let path = path.map_err(|e| format!("{argument}: {e}"))?;
                     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                     let argument = path.to_string_lossy().into_owned();
                     Selected { name, argument, path, size: None, absent: None }
@@ -191,6 +192,19 @@ mod tests {
             select(&paths, &[]),
             cases(&[("jet", false), ("cube_small", false), ("cube_small-2", false)])
         );
+    }
+
+    /// The files of a case may be links into a store.
+    #[test]
+    fn a_case_that_is_a_link_keeps_its_name_and_directory() {
+        let place = tempfile::tempdir().unwrap();
+        let link = place.path().join("case.toml");
+        fs::create_dir(place.path().join("store")).unwrap();
+        fs::write(place.path().join("store/7f3a"), "").unwrap();
+        std::os::unix::fs::symlink("store/7f3a", &link).unwrap();
+        let catalogue = Catalogue { path: "nowhere/catalogue.toml".into() };
+        let selected = catalogue.select(&[link.to_string_lossy().into_owned()], &[]).unwrap();
+        assert_eq!((selected[0].name.as_str(), &selected[0].path), ("case", &link));
     }
 
     #[test]

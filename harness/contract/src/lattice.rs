@@ -76,9 +76,9 @@ impl Root {
     /// The unit cube.
     pub const UNIT: Self = Self { origin: [0.0; 3], edge: 1.0 };
 
-    /// Whether it is a cube: its edge is positive, and all numbers are finite.
+    /// Whether it is a cube: its edge is positive, and all numbers are finite, as are those that are computed with them.
     pub fn is_cube(&self) -> bool {
-        self.edge > 0.0 && self.edge.is_finite() && self.origin.iter().all(|c| c.is_finite())
+        (1e-100..1e100).contains(&self.edge) && self.origin.iter().all(|c| c.abs() < 1e100)
     }
 
     /// A vertex on the lattice; `None` if it is not finite or lies more than one root edge outside the root.

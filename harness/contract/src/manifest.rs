@@ -283,15 +283,13 @@ impl Manifest {
             let is_ordered = (0..3).all(|a| b.min[a] <= b.max[a]);
             b.level <= LEVEL_MAX && is_ordered && in_root(&b.min) && in_root(&b.max)
         };
-        let (Root { origin, edge }, range) = (self.root, 1e-100..1e100);
-        let is_root = range.contains(&edge) && origin.iter().all(|c| c.abs() < range.end);
         let faults = [
             (self.octant_digests.len() == OCTANTS, "octant_digests: give 512"),
             (self.level_surface <= LEVEL_MAX, "level_surface: give a level from 0 to 19"),
             (self.layer_cells_min > 0, "layer_cells_min: a layer has at least one cell"),
             (self.boxes.iter().all(is_box), "boxes: one is not in the root, or has no level"),
             (self.seeds.iter().all(in_root), "seeds: one is not in the root"),
-            (is_root, "root: give a cube with an edge from 1e-100 to 1e100"),
+            (self.root.is_cube(), "root: give a cube with an edge from 1e-100 to 1e100"),
         ];
         faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault.to_owned())
     }

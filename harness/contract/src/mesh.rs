@@ -171,7 +171,7 @@ impl Mesh {
         let why = format!(
             "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
         );
-        Failure::unless(digest == stated, why)
+        Failure::unless(digest == stated, Failure::about(&self.dir, why))
     }
 
     /// All leaves as a tree.

@@ -252,6 +252,7 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.timeout, &place));
     // A program that fails without valgrind, too, states the cause.
+    let options = RunOptions::new(&place, bench.options.timeout);
     counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
     match counted_by_all(&place) {
         Ok(0) => Err(engine.unusable("has no profile with costs by valgrind".to_owned())),

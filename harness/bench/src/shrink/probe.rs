@@ -166,7 +166,7 @@ impl Probe {
 /// A run without a mesh as a failed check.
 fn failed_run(failure: Ended, ranks: Ranks) -> Result<Fault> {
     let end = match &failure.end {
-        End::Missing(_) | End::Interrupted => return Err(Failure::input(failure)),
+        End::Missing(_) | End::Interrupted => return Err(failure.into()),
         End::TimedOut { .. } => "hangs".to_owned(),
         End::Exited { code, error } => format!("code {code} {}", place_in_source(error)),
         End::Signalled(signal) => format!("signal {signal}"),

@@ -14,12 +14,11 @@ mod tests;
 
 use std::path::Path;
 use std::time::Instant;
-use std::{fmt, fs, io};
+use std::{fmt, fs};
 
 use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
-use contract::files::write_atomically;
 use contract::manifest::{Manifest, Tree as Kind};
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::number::labelled;
@@ -62,24 +61,21 @@ impl AuditReport {
 
     /// Whether any property of the leaves was checked, beyond their files and counts.
     pub fn checked_anything(&self) -> bool {
-        let formal = [checks::FILES, checks::manifest::NAME, "linear"];
+        let formal = [checks::FILES, checks::manifest::NAME, "linear", TREE];
         self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
     }
 
-    /// Writes the report as JSON, with the CPU time and peak memory of the process so far. They describe the audit only if the
+    /// The report as JSON, with the CPU time and peak memory of the process so far. They describe the audit only if the
     /// process did nothing else, as in `harness audit`.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write(&self, path: &Path) -> io::Result<()> {
-        let mut record = serde_json::to_value(self)?;
+    pub fn json(&self) -> String {
+        let mut record = serde_json::to_value(self).expect("a report has string keys only");
         record["schema"] = "octree-audit/1".into();
         record["holds"] = self.holds().into();
         record["time_cpu_s"] = ProcessTime::now().as_duration().as_secs_f64().into();
         // 0 if the system does not report it.
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         record["peak_rss_bytes"] = (1024 * labelled(&status, "VmHWM:").unwrap_or(0)).into();
-        write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, &record)?))
+        format!("{record:#}\n")
     }
 
     /// Panics if an invariant of the answer does not hold.
@@ -134,6 +130,7 @@ fn audit_within(most: usize, dir: &Path, case: Option<&Case>, promises: &Promise
             if manifest.tree == Kind::Base && case.is_some_and(|case| case.tree == Kind::Final) {
                 files.report("mesh.json states the tree \"base\": T0, which is not the final mesh");
             }
+            files.needs_objects("mesh.json names no file of leaves");
             let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
             let beside_parts = tree.filter(|_| mesh.tree_file.is_none());

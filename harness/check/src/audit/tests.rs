@@ -181,6 +181,16 @@ fn a_report_that_contradicts_itself_is_a_bug() {
     }
 }
 
+#[test]
+fn a_manifest_that_names_no_file_gives_no_check_anything_to_check() {
+    let promises = Promises { balance: Some(Touching::Face), ..Promises::default() };
+    let dir = tempfile::tempdir().unwrap();
+    leaf_set(vec![]).write(dir.path()).unwrap();
+    let report = audit_against(dir.path(), None, &promises);
+    assert!(report.holds() && report.not_run().count() == report.checks.len(), "{report}");
+    assert!(report.to_string().contains("mesh.json names no file of leaves"), "{report}");
+}
+
 /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
 #[test]
 fn an_exceeded_memory_limit_is_a_finding() {
@@ -299,19 +309,22 @@ fn a_tree_beside_parts_must_have_their_leaves() {
     assert!(text.ends_with(&other.manifest.digest.to_string()), "{text}");
     let (_, text) = tree_file(&correct, &bytes[..bytes.len() / 2]);
     assert!(text.contains(TREE_FILE) && text.contains("is damaged"), "{text}");
+    // That both have the same leaves shows nothing about them.
+    let dir = tempfile::tempdir().unwrap();
+    correct.write(dir.path()).unwrap();
+    std::fs::write(dir.path().join(TREE_FILE), &bytes).unwrap();
+    let boxes = Promises { boxes: true, ..Promises::default() };
+    let report = audit_against(dir.path(), None, &boxes);
+    assert!(report.holds() && !report.checked_anything(), "{report}");
 }
 
 #[test]
 fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
-    let place = tempfile::tempdir().unwrap();
     let mut set = leaf_set(vec![correct()]);
-    let path = place.path().join("report.json");
     for extra_leaves in [0, 1] {
         set.manifest.leaves += extra_leaves;
         let report = audited(&set);
-        report.write(&path).unwrap();
-        let read: serde_json::Value =
-            serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        let read: serde_json::Value = serde_json::from_str(&report.json()).unwrap();
         assert_eq!(read["schema"], "octree-audit/1");
         assert_eq!(read["holds"], extra_leaves == 0);
         assert_eq!(read["leaves"], report.leaves);
@@ -325,6 +338,5 @@ fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
             }
             assert_eq!(*written, expected);
         }
-        fs::remove_file(&path).unwrap();
     }
 }

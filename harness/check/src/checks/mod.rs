@@ -39,7 +39,7 @@ const UNKNOWN_INPUTS: &str = "the inputs of the mesh are unknown without a case"
 /// Why what needs facets is not checked.
 const NO_GEOMETRY: &str = "the geometry is unknown without a case";
 /// Why nothing can be wrong.
-pub(crate) const NO_LEAVES: &str = "the mesh has no leaves";
+pub const NO_LEAVES: &str = "the mesh has no leaves";
 
 /// A property of meshes.
 pub struct Check {

@@ -30,7 +30,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         return result.lacks("T0 does not fit its limit, as `capacity` states");
     };
     let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
+    if let Err(why) = refuse_too_large(subject.pass.tally.leaves, &meminfo) {
         return result.lacks(why);
     }
     Mesh::of(&subject.inputs, subject.tree(), Some(truth)).audit(&mut |octant, fault| {
@@ -59,6 +59,22 @@ fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::case::Case;
+    use contract::manifest::Tree;
+    use contract::testing::{leaf_set, words_of};
+
+    /// A manifest may state any number.
+    #[test]
+    fn memory_is_needed_for_the_leaves_that_exist() {
+        let text =
+            "spacing_min = 8.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let case = Case::from_parts(text, vec![]).unwrap();
+        let mut mesh = leaf_set(vec![words_of(|_| false)]);
+        mesh.manifest.leaves = u64::MAX;
+        let subject = Subject::new(&case, Tree::Final, &mesh);
+        let result = super::super::only(&subject, &[NAME]).remove(0);
+        assert!(result.was_run() && result.holds(), "{result}");
+    }
 
     #[test]
     fn a_mesh_that_exceeds_the_available_memory_is_refused_before_the_audit() {

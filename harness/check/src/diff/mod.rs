@@ -16,7 +16,7 @@ use crate::why;
 use contract::case::Case;
 use contract::failure::Result;
 use contract::htg::Block;
-use contract::manifest::{Manifest, Sides};
+use contract::manifest::Sides;
 use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word;
@@ -68,6 +68,10 @@ impl fmt::Display for DiffReport {
     }
 }
 
+/// Counts in a manifest, the last three of which follow from the sides.
+const COUNTS: [&str; 5] =
+    ["leaves", "leaves_by_level", "components", "components_ambiguous", "leaves_by_side"];
+
 /// Compares two leaf-set directories, each with leaf words or the tree. If their common case is given, facets and rays help to decide which is right.
 ///
 /// # Errors
@@ -87,13 +91,16 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport> {
         })?;
         mesh.manifest = manifest;
     }
+    let (of_a, of_b) = (("A", &a.manifest), ("B", &b.manifest));
+    // What follows from the sides is left out if a mesh has none.
+    let counts = if without_sides.is_some() { &COUNTS[..2] } else { &COUNTS[..] };
     let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests);
-    let differing = (0..).zip(digests).filter(|(_, (x, y))| x != y);
+    let octants = (0..).zip(digests).filter(|(_, (x, y))| x != y);
     let mut report = DiffReport {
         without_sides,
         leaves: a.manifest.leaves,
-        fields: fields(("A", &a.manifest), ("B", &b.manifest)),
-        octants: differing.map(|(index, _)| word::octant(index << 55 | 3 << 2)).collect(),
+        fields: [differing_inputs(of_a, of_b), differing(counts, of_a, of_b)].concat(),
+        octants: octants.map(|(index, _)| word::octant(index << 55 | 3 << 2)).collect(),
         ..DiffReport::default()
     };
     if let Some(octant) = report.octants.first() {
@@ -133,17 +140,6 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, [x, y]: [Option<u64>; 2]) -> St
     let [a, b] = [(a, &of_a), (b, &of_b)]
         .map(|(mesh, tree)| why::Mesh::of(&mesh.manifest, tree, body.as_ref()));
     caveat + &rule::at(&a, &b, x, y)
-}
-
-/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
-fn fields(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<String> {
-    let mut counts = vec!["leaves", "leaves_by_level"];
-    if [a, b].iter().all(|(_, manifest)| manifest.sides == Sides::Known) {
-        counts.extend(["components", "components_ambiguous", "leaves_by_side"]);
-    }
-    let mut fields = differing_inputs(a, b);
-    fields.extend(differing(&counts, a, b));
-    fields
 }
 
 #[cfg(test)]

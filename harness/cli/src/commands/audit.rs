@@ -2,6 +2,7 @@
 
 use super::import::Source;
 use crate::options::{Input, Output, examples};
+use crate::output::put_forms;
 use check::audit::{AuditReport, audit_against};
 use check::forest;
 use check::promises::{Promises, Touching};
@@ -72,25 +73,20 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     source.refuse_unused(&[mesh])?;
     let opened = source.open(mesh, case.as_ref())?;
     let directory = &opened.dir;
-    let otherwise = match *balance {
-        None => Promises::of_definition(),
-        balance => Promises { balance, ..Promises::default() },
-    };
+    let definition = balance.is_none();
+    let otherwise = Promises { definition, balance: *balance, ..Promises::default() };
     let promises = engine.as_ref().map_or(&otherwise, |engine| &engine.promises);
     let paths = Paths::find();
     if let Some(why) = proved.as_ref().and_then(|_| paths.lacks_checker()) {
         return Err(Failure::missing(why));
     }
     let mut report = audit_against(directory, case.as_ref(), promises);
-    let mut unproven = None;
-    if let Some(base) = proved {
-        match proven(&paths.proven_checker, (directory, base), report.leaves, LIMIT) {
-            Ok(proof) => report.checks.push(proof),
-            Err(failure) => unproven = Some(Failure::from(failure)),
-        }
-    }
+    let checker = &paths.proven_checker;
+    let proof = |base: &Input| proven(checker, (directory, base), report.leaves, LIMIT);
+    let proof = proved.as_ref().map(proof).transpose();
+    let unproven = proof.map(|proof| report.checks.extend(proof)).map_err(Failure::from);
     let mut code = publish(&report, arguments)?;
-    if let Some(Failure { code: of_proof, why }) = unproven {
+    if let Err(Failure { code: of_proof, why }) = unproven {
         println!("left out: proof: {why}");
         code = exit_first(code, of_proof);
     }
@@ -107,16 +103,14 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8> {
     report.check_invariants();
     println!("{report}");
-    if let Some(path) = &arguments.json {
-        report.write(path).map_err(|error| Failure::at(path, error))?;
-    }
     let not_run = || report.not_run().next().is_some();
     let is_incomplete = !report.checked_anything() || report.exceeds_memory();
-    Ok(match () {
+    let code = match () {
         () if !report.holds() => EXIT_FAILED,
         () if is_incomplete || arguments.require_checks && not_run() => EXIT_MISSING,
         () => EXIT_HOLDS,
-    })
+    };
+    put_forms(code, &[(arguments.json.as_deref(), &|| report.json())], None)
 }
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.

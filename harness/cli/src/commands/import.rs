@@ -50,16 +50,17 @@ pub struct Source {
 }
 
 impl Source {
+    /// Whether options state what places and sides the cells of one mesh have.
+    fn is_of_cells(&self) -> bool {
+        self.root.is_some() || self.sides.is_some() || self.position != Position::default()
+    }
+
     /// Refuses options that have no effect, because each of the meshes is a leaf-set directory.
     ///
     /// # Errors
     /// If any is given.
     pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
-        let Self { format, root, case: _, sides, position, timeout: _ } = self;
-        let is_given = format.is_some()
-            || root.is_some()
-            || sides.is_some()
-            || *position != Position::default();
+        let is_given = self.format.is_some() || self.is_of_cells();
         let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
         let why = "has a manifest, which states root and sides: omit the options for them";
         Failure::unless(is_used, format!("{} {why}", meshes[0].display()))
@@ -70,9 +71,8 @@ impl Source {
     /// # Errors
     /// If the file is damaged.
     pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>> {
-        let Self { format, root, case, sides, .. } = self;
-        let is_one_mesh = root.is_some() || case.is_some() || sides.is_some();
-        if is_one_mesh || format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
+        let is_one_mesh = self.case.is_some() || self.is_of_cells();
+        if is_one_mesh || self.format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
             return Ok(None);
         }
         Ok(Some(forest::read(mesh).map_err(|error| error.of_file(mesh))?))

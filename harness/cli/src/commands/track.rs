@@ -6,39 +6,40 @@ use bench::experiments::machine;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
 use bench::track::{Series, VALUES_MIN, analyse};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use report::pretty;
-use report::track::{junit, page, summary};
+use report::track::{COMMIT, junit, page, summary};
 use run::engine::paths::Paths;
 use std::path::{Path, PathBuf};
 
 /// `harness track`.
 #[derive(Args, Debug)]
+#[command(group = ArgGroup::new("appended").multiple(true))]
 pub struct Arguments {
     /// The history: JSON lines, one record per commit
     history: PathBuf,
     /// Append the numbers of this record or JSON report of `harness gate`; may be repeated
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = "appended")]
     add: Vec<Input>,
     /// Also append this value; may be repeated
-    #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
+    #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number, group = "appended")]
     value: Vec<(String, f64)>,
     /// The commit of the appended values [default: that of the file, or HEAD; none for a working tree with changes]
-    #[arg(long, value_name = "REVISION")]
+    #[arg(long, value_name = "REVISION", requires = "appended")]
     commit: Option<String>,
     /// Accept the change of every metric at this commit of the history, or the nearest within two values and ten commits, so that it no
     /// longer fails; may be repeated
     #[arg(long, value_name = "COMMIT")]
     accept: Vec<String>,
     /// The repository that the commit is in [default: that of the current directory]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", requires = "appended")]
     repository: Option<PathBuf>,
     /// Write the trend page
     #[arg(long, value_name = "FILE")]
     page: Option<Output>,
     /// Address of a commit for the links of the page, with {commit}, such as https://host/name/repository/commit/{commit}
-    #[arg(long, value_name = "URL")]
+    #[arg(long, value_name = "URL", requires = "page")]
     link: Option<String>,
     /// Write a test per metric as JUnit XML
     #[arg(long, value_name = "FILE")]
@@ -68,12 +69,12 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
 /// # Errors
 /// If the history cannot be read or continued, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let shown = arguments.history.display();
+    let (shown, link) = (arguments.history.display(), arguments.link.as_deref());
+    let why = "--link has no {commit}, the place of a commit's hash";
+    Failure::unless(link.is_none_or(|link| link.contains(COMMIT)), why)?;
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else {
-        let without = "there is nothing to append: give --add or --value with --commit";
-        Failure::unless(arguments.commit.is_none(), without)?;
         let why = "is missing: give a history, or the first values with --add or --value";
         Failure::unless(arguments.history.exists(), format!("{shown} {why}"))?;
     }
@@ -98,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             "in {few} metrics no step can be found yet: they have fewer than {VALUES_MIN} values"
         );
     }
-    let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
+    let recent = arguments.fail_recent;
     let is_worse = |series: &&Series| series.worse_recently(recent).is_some();
     let worse: Vec<&str> = all.iter().filter(is_worse).map(|series| &*series.name).collect();
     if !worse.is_empty() {

@@ -153,8 +153,10 @@ impl Subject<'_> {
             return Some("it panicked".to_owned());
         }
         let code = ended.code;
+        // A finding has the exit code that it has without the fault.
+        let is_reported = self.program.code == 1 && ended.err.contains("could not be written");
         // A run may have fewer calls than the one before.
-        if call.is_none() || code == Some(self.program.code) && end != End::Kill {
+        if call.is_none() || code == Some(self.program.code) && end != End::Kill && !is_reported {
             let lost = end == End::Lost && call.is_some_and(|call| self.is_output(call));
             return match self.is_complete(after) {
                 true if !lost => None,

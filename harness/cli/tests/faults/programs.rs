@@ -239,7 +239,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
         },
         Program {
             code: 1,
-            refusals: &[2, 3],
+            refusals: &[1, 2, 3],
             ..new(
                 "leak",
                 Harness,

@@ -12,7 +12,8 @@ const SHRINK: &str = "shrink case.toml --engine engine.toml --ranks 8";
 #[test]
 fn a_failure_on_three_ranks_is_shrunk_to_its_two_facets() {
     let fixture = Fixture::new();
-    let outcome = fixture.harness(&format!("{SHRINK} --out tiny"));
+    let options = "--timeout 77 --reference engine";
+    let outcome = fixture.harness(&format!("{SHRINK} --out tiny {options}"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     let case = contract::case::Case::read(&fixture.path("tiny/case.toml")).unwrap();
     let mut positions: Vec<f32> = case.facets.iter().map(|facet| facet[0][0]).collect();
@@ -28,6 +29,7 @@ fn a_failure_on_three_ranks_is_shrunk_to_its_two_facets() {
     assert!(outcome.printed.contains("first difference: the mesh has"), "{}", outcome.printed);
     let readme = fs::read_to_string(fixture.path("tiny/README.md")).unwrap();
     let line = readme.lines().find(|line| line.contains("harness shrink")).unwrap().trim();
+    assert!(line.contains(options), "{line}");
     let again = fixture.harness(line.strip_prefix("harness ").unwrap());
     assert_eq!(again.code, 1, "{line}: {}", again.printed);
 }
@@ -39,6 +41,9 @@ fn a_passing_case_is_not_shrunk() {
     assert_eq!(outcome.code, 0, "{}", outcome.printed);
     assert!(!fixture.path("tiny").exists());
     assert_eq!(fixture.harness(&format!("{SHRINK} --test-only")).code, 1);
+    let without = fixture.harness(&format!("{SHRINK} --test-only --mpi"));
+    assert!(without.printed.contains("has no `parallel` in [run]"), "{}", without.printed);
+    assert_eq!(without.code, 3);
     let nowhere = fixture.harness(&format!("{SHRINK} --out nowhere/deep/tiny"));
     assert!(nowhere.code == 1 && fixture.path("nowhere/deep/tiny/README.md").is_file());
 }
@@ -240,6 +245,10 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert!(outcome.printed.contains(named), "{}", outcome.printed);
     for wrong in ["words=1", "case/words=1e200", "case/words=nan", "case/x=5 --value case/x=7"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
+    }
+    // Options that would have no effect, and an address that is the same for all commits.
+    for unused in ["--commit HEAD", "--repository .", "--link x/{commit}", "--page p --link x"] {
+        assert_eq!(fixture.harness(&format!("track history.jsonl {unused}")).code, 2, "{unused}");
     }
     let series = fs::read_to_string(fixture.path("trend.json")).unwrap();
     assert!(series.contains("\"first_new\"") && series.contains("44.0"), "{series}");

@@ -61,7 +61,7 @@ fi"#;
 pub struct Fixture(TempDir);
 
 impl Fixture {
-    /// Writes correct programs. MPI, oracles and p4est are missing.
+    /// Writes correct programs. MPI, oracles and, unless a test writes it, p4est are missing.
     pub fn new() -> Self {
         let fixture = Self(tempfile::tempdir().unwrap());
         fs::create_dir(fixture.path("tmp")).unwrap();
@@ -164,7 +164,9 @@ impl Fixture {
             .env("PATH", path)
             .env("TMPDIR", self.path("tmp"))
             .env("HARNESS_ROOT", self.path("root"));
-        command.env("HARNESS_PYTHON", "/nowhere/python").env("HARNESS_P4EST", "/nowhere/p4est");
+        let p4est = Some(self.path("p4est")).filter(|program| program.is_file());
+        command.env("HARNESS_P4EST", p4est.unwrap_or("/nowhere/p4est".into()));
+        command.env("HARNESS_PYTHON", "/nowhere/python");
         command.env("GITHUB_STEP_SUMMARY", self.path("summary.md"));
         let output = command.output().unwrap();
         let printed =

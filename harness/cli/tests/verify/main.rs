@@ -127,9 +127,35 @@ fn two_reports_in_one_file_are_invalid_input() {
     let fixture = Fixture::new();
     let file = fixture.path("report");
     let file = file.to_str().unwrap();
-    let outcome = fixture.verify(&["--no-mpi", "--json", file, "--junit", file]);
+    fs::create_dir(fixture.path("out")).unwrap();
+    let within = ["--out", "out", "--junit", "out/report.json"];
+    for options in [&["--json", file, "--junit", file][..], &within] {
+        let outcome = fixture.verify(&[&["--no-mpi"], options].concat());
+        assert_eq!(outcome.code, 2, "{}", outcome.printed);
+        assert!(outcome.printed.contains("this run also writes"), "{}", outcome.printed);
+    }
+}
+
+#[test]
+fn a_summary_that_cannot_be_written_is_named() {
+    let fixture = Fixture::new();
+    fs::create_dir(fixture.path("summary.md")).unwrap();
+    let outcome = fixture.verify(&["--no-mpi"]);
     assert_eq!(outcome.code, 2, "{}", outcome.printed);
-    assert!(outcome.printed.contains("this run also writes"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("could not be written: /"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("summary.md: "), "{}", outcome.printed);
+}
+
+/// What is in the way of the second case is found before the first.
+#[test]
+fn a_directory_of_something_else_is_refused_before_the_first_case() {
+    let fixture = Fixture::new();
+    fixture.write("other.toml", &fixture.read("case.toml"));
+    fixture.write("out/other/precious", "");
+    let outcome = fixture.verify(&["other.toml", "--no-mpi", "--out", "out"]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("no verification made it"), "{}", outcome.printed);
+    assert!(!fixture.path("out/case").exists() && fixture.path("out/other/precious").exists());
 }
 
 #[test]
@@ -303,6 +329,52 @@ fn a_case_on_which_nothing_was_checked_is_not_green() {
     let outcome = fixture.harness(&["verify", "--size", "large"]);
     assert_eq!(outcome.code, 2, "{}", outcome.printed);
     assert!(outcome.printed.contains("no case in "), "{}", outcome.printed);
+}
+
+/// Of ranks that stay, no other memory is measured.
+#[test]
+fn the_memory_of_rank_0_is_not_that_of_all_ranks() {
+    let fixture = Fixture::new();
+    fixture.script_mpirun();
+    fixture.script("mesher", &HOLDS.replace("\"ranks\": %s", "\"other\": %s"));
+    let outcome = fixture.verify(&["--json", "report.json"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
+    let runs = json["cases"][0]["runs"].as_array().unwrap();
+    let on_ranks: Vec<_> = runs.iter().filter(|run| !run["layout"].is_null()).collect();
+    assert_eq!(on_ranks.len(), 2);
+    assert!(on_ranks.iter().all(|run| run["peak_rss_bytes"].is_null()), "{runs:?}");
+}
+
+/// An engine that reads binary STL files only, and whose arrays have names of their own, or that keeps the outside only.
+#[test]
+fn the_comparison_with_p4est_is_made_with_what_the_engine_takes_and_writes() {
+    let fixture = Fixture::new();
+    let balances =
+        "test -f \"$1/leaves-00000.npy\" && cp \"${0%/*}/other/leaves-00000.npy\" \"$2\"";
+    fixture.script("p4est", balances);
+    let engine = "[run]\nserial = [\"{here}/mesher\", \"{case}\"]\nout = [\"--out\", \"{out}\"]\n\
+                  json = [\"--json\", \"{json}\"]\nungraded = [\"--ungraded\"]\n[takes]\n";
+    let renamed = "[ -z \"$out\" ] || { mv \"$out/leaves-00000.npy\" \"$out/words.npy\"\n\
+                   sed -i 's/leaves-00000/words/; s/\"keep\":\"all\"/\"keep\":\"'$keep'\"/' \"$out/mesh.json\"; }";
+    let case = fixture.read("case.toml");
+    for (keep, takes, refuses, outcome) in [
+        ("all", "stl = \"binary\"", "! grep -q '^solid' \"${1%/*}/body.stl\"", "pass"),
+        ("outside", "keep = [\"outside\"]", "! grep -q '^keep = \"all\"' \"$1\"", "left_out"),
+    ] {
+        fixture.write("case.toml", &case.replace("\"all\"", &format!("\"{keep}\"")));
+        fixture.write("engine.toml", &format!("{engine}{takes}\n"));
+        fixture.script("mesher", &format!("{refuses} || exit 2\nkeep={keep}{HOLDS}\n{renamed}"));
+        let options = ["--engine", "engine.toml", "--json", "report.json"];
+        let verified = fixture.harness(&[&["verify", "case.toml"], &options[..]].concat());
+        assert_eq!(verified.code, 0, "{}", verified.printed);
+        let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
+        let checks = json["cases"][0]["checks"].as_array().unwrap();
+        let by_p4est = checks.iter().find(|check| check["subject"] == "p4est").unwrap();
+        assert_eq!(by_p4est["outcome"], outcome, "{by_p4est}");
+        let why = by_p4est["why"].as_str().unwrap_or_default();
+        assert!(outcome == "pass" || why.contains("does not support keep = all"), "{why}");
+    }
 }
 
 #[test]

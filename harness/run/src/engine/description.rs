@@ -285,6 +285,7 @@ mod tests {
         assert!(why(&LEAST.replace("'{case}'", "'{launcher}'")).contains("{launcher}"));
         assert!(why(&format!("{LEAST}status = ['{{out}}']\n")).contains("`status`"));
         assert!(why(&format!("{LEAST}outt = []\n")).contains("outt"));
+        assert!(why(&format!("{LEAST}serve = ['{{case}}']\n")).contains("`serve`"));
     }
 
     #[test]

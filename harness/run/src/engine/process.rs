@@ -65,7 +65,8 @@ impl<'a> Watch<'a> {
     }
 
     pub(super) fn log(&self, stream: &str) -> PathBuf {
-        self.logs.join(format!("{}.{stream}", self.name))
+        // The name of an engine may be the path of its file.
+        self.logs.join(format!("{}.{stream}", self.name.replace('/', "-")))
     }
 
     /// Waits until `look` finds what it looks for. After an error the child may still run.

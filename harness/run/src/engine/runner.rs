@@ -17,7 +17,7 @@ use contract::plain::{PlainCase, StlForm};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
@@ -59,8 +59,8 @@ impl Engine {
         }
         let places = description.places(paths);
         let program = match given {
-            // A name without a slash would be searched for on the PATH.
-            Some(given) => fs::canonicalize(given).unwrap_or_else(|_| given.to_owned()),
+            // A name without a slash would be searched for on the PATH. A link may lead to a program that behaves by its own name.
+            Some(given) => path::absolute(given).unwrap_or_else(|_| given.to_owned()),
             None => {
                 let program = fill(&description.program, &places);
                 let found = (!program.contains('/')).then(|| on_path(&program)).flatten();
@@ -153,16 +153,26 @@ impl Engine {
         PlainCase::read(case)?.write(directory, takes.stl).map_err(|error| error.to_string())
     }
 
-    /// The command of a run.
+    /// The values of the placeholders that do not depend on a run.
+    fn values(&self) -> Values<'static> {
+        let program = self.program.to_string_lossy().into_owned();
+        self.places.clone().into_iter().chain([("program", program)]).collect()
+    }
+
+    /// The command of a run. What it writes in a format of its own has an empty place afterwards.
     ///
     /// # Errors
-    /// [`End::Missing`] if the engine file has no template for it.
+    /// [`End::Missing`] if the engine file has no template for it; another end if there is no such place.
     pub fn command(&self, case: &Path, layout: &Layout, options: &RunOptions) -> Result<Command> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
-        let mut values = self.places.clone();
-        values.extend([("program", text(&self.program)), ("case", text(case))]);
+        let mut values = self.values();
+        values.insert("case", text(case));
         let templates = &self.description.run;
-        let out = self.mesh_path(options).map(|mesh| match templates.format {
+        let mesh = self.mesh_path(options);
+        if let (Some(mesh), Some(_)) = (&mesh, templates.format) {
+            import::clear(options.place, mesh)?;
+        }
+        let out = mesh.map(|mesh| match templates.format {
             Some(_) => text(&import::foreign(options.place)),
             None => text(&mesh),
         });
@@ -183,9 +193,6 @@ impl Engine {
         let mesh = self.mesh_path(options);
         // An earlier run's files must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
-        if let (Some(mesh), Some(_)) = (&mesh, self.description.run.format) {
-            import::clear(options.place, mesh)?;
-        }
         let finished = self.drive(&mut command, layout.ranks, options)?;
         let written = mesh.as_deref().map(|mesh| {
             import::complete(&self.description, self.label(), &command, case, mesh, options)
@@ -213,8 +220,8 @@ impl Engine {
         Ok(mesh)
     }
 
-    /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside where the program
-    /// reported none, or that of rank 0 alone.
+    /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside, if it was, where
+    /// the program reported none, or that of rank 0 alone.
     fn report(
         &self,
         written: Option<&Mesh>,
@@ -252,10 +259,8 @@ impl Engine {
             ));
         }
         let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
-        if let Some(peak) = finished.peak_rss_bytes
-            && (is_of_one || report.peak_rss_bytes.is_empty())
-        {
-            report.peak_rss_bytes = vec![peak];
+        if is_of_one || report.peak_rss_bytes.is_empty() {
+            report.peak_rss_bytes = finished.peak_rss_bytes.into_iter().collect();
         }
         Ok(report)
     }
@@ -306,7 +311,9 @@ impl Engine {
         let serve = Some(&self.description.run.serve).filter(|serve| !serve.is_empty())?;
         let start = move || {
             let (mut command, shared) = self.launcher.command(count, &self.program);
-            command.args(serve);
+            let mut values = self.values();
+            values.insert("ranks", count.to_string());
+            command.args(serve.iter().map(|word| fill(word, &values)));
             (command, shared)
         };
         Some((format!("{} on {count} ranks", self.program.display()), start))
@@ -428,6 +435,17 @@ mod tests {
         assert_eq!(words(&mesher, &on_mpi, &files), expected);
         let reference = "reference a.toml --out mesh --ungraded";
         assert_eq!(words(&programs.reference, &on_serial(&simulated), &files), reference);
+    }
+
+    #[test]
+    fn the_words_that_make_ranks_stay_are_filled_in() {
+        let programs = Programs::find("mesher", &Default::default()).unwrap();
+        let mut engine = programs.mesher;
+        engine.description.run.serve = vec!["--serve".into(), "{program} on {ranks}".into()];
+        let (_, start) = engine.service(3).unwrap();
+        let (command, _) = start();
+        let last = format!("{} on 3", engine.program.display());
+        assert_eq!(command.get_args().last().unwrap().to_str(), Some(&*last));
     }
 
     /// The same choices, serially: the reference does not offer them.

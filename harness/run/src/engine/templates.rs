@@ -15,8 +15,7 @@ pub type Values<'a> = BTreeMap<&'a str, String>;
 pub(super) const LAUNCHER: &str = "{launcher}";
 
 /// Placeholders that have a value in every template.
-const COMMON: [&str; 8] =
-    ["program", "case", "ranks", "here", "root", "python", "mpirun", "target"];
+const COMMON: [&str; 7] = ["program", "ranks", "here", "root", "python", "mpirun", "target"];
 
 /// Command templates, as lists of words. An empty template is a capability that the engine does not have.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -109,7 +108,8 @@ impl Templates {
         let needs_out = self.out.is_empty();
         for (key, template) in self.commands().into_iter().filter(|(_, of)| !of.is_empty()) {
             let seed = (key == "simulated").then_some("seed");
-            let own: Vec<&str> = seed.into_iter().chain(needs_out.then_some("out")).collect();
+            let out = needs_out.then_some("out");
+            let own: Vec<&str> = [Some("case"), seed, out].into_iter().flatten().collect();
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
             check_known(key, &words.cloned().collect::<Vec<_>>(), &own)?;
             let has = |text: &str| template.iter().any(|word| word.contains(text));
@@ -124,7 +124,8 @@ impl Templates {
             }
         }
         check_known("serve", &self.serve, &[])?;
-        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of, &[key]))
+        let mut appended = self.appended().into_iter();
+        appended.try_for_each(|(key, of)| check_known(key, of, &["case", key]))
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the

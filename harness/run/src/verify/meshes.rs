@@ -155,13 +155,12 @@ impl CaseRun<'_> {
         if !self.promises().is_deterministic() {
             return;
         }
-        let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
-        let outcome = match *first == second && timed.cells == mesh.words.len() as u64 {
-            true => Outcome::held(mesh.words.len() as u64),
+        let &Run { cells, digest: ref first, .. } = timed;
+        let (again, second) = (mesh.words.len() as u64, mesh.manifest.digest.to_string());
+        let outcome = match (cells, first) == (again, &second) {
+            true => Outcome::held(cells),
             false => Outcome::fail(format!(
-                "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
-                timed.cells,
-                mesh.words.len()
+                "two serial runs differ: {cells} cells, digest {first}; {again} cells, digest {second}"
             )),
         };
         self.add(Check::new("serial", DETERMINISTIC, outcome), None);

@@ -41,16 +41,16 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     let why = format!("no case in {} has this size", programs.paths.catalogue.path.display());
     Failure::unless(!selected.is_empty(), why)?;
-    let verification = Verification {
-        options,
-        programs,
-        workplace: Workplace::new(options)?,
-        needs: Needs::probe(options, programs),
-    };
-    let mut cases = Vec::new();
-    for case in selected.iter().take_while(|_| !interrupt::requested()) {
-        cases.push(verification.case(case)?);
+    let workplace = Workplace::new(options)?;
+    // What is in the way of a later case must not cost the results of those before it.
+    let mut places = selected.iter().map(|case| workplace.root.join(&case.name));
+    if let Some(place) = places.find(|place| place.exists() && !place.join(MARKER).is_file()) {
+        return Err(Failure::about(&place, "is there already, and no verification made it"));
     }
+    let verification =
+        Verification { options, programs, workplace, needs: Needs::probe(options, programs) };
+    let begun = selected.iter().take_while(|_| !interrupt::requested());
+    let cases = begun.map(|case| verification.case(case)).collect::<Result<Vec<_>>>()?;
     let Verification { needs, workplace, .. } = verification;
     Progress.finish();
     let interrupted = interrupt::requested();

@@ -9,7 +9,7 @@ use crate::engine::service::Services;
 use crate::python::{ORACLES, start};
 use check::promises::Independence;
 use clap::Parser;
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{PathBufValueParser, RangedU64ValueParser, TypedValueParser};
 use contract::catalogue::Size;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,7 +58,7 @@ pub struct Options {
     #[arg(long, value_delimiter = ',')]
     pub level_bases: Option<Vec<String>>,
     /// Directory for reports and for results that are kept [default: a temporary one]
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = PathBufValueParser::new().try_map(|out| files::name_output(&out).map(|()| out)))]
     pub out: Option<PathBuf>,
     /// Also keep the results of passing cases
     #[arg(long)]

@@ -9,16 +9,16 @@ use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::layout::{self, SERIAL};
 use crate::engine::process::{self, Watch};
 use crate::python::{ORACLES, ask};
-use check::checks::{CheckResult, identical};
+use check::checks::{CheckResult, NO_LEAVES, identical};
 use check::oracle::vote::{Answer, Ballot};
 use check::oracle::{self, Sample, is_doubled, is_watertight};
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::leafset::LeafSet;
 use contract::manifest::Tree;
-use contract::npy::PartFile;
+use contract::npy::{self, PartFile};
 use contract::parity::Parity;
-use contract::plain::{PlainCase, StlForm};
+use contract::plain::PlainCase;
 use contract::word::{self, Side};
 use std::fs;
 use std::io;
@@ -49,7 +49,7 @@ impl CaseRun<'_> {
             let judged = match need {
                 Need::Proof => self.prove(step, serial, base),
                 Need::Oracles => self.vote(step, case, &base.mesh),
-                _ => self.balance(step, base),
+                _ => self.balance(step, &base.mesh),
             };
             let mut check = match judged {
                 Ok(check) => check,
@@ -111,29 +111,35 @@ impl CaseRun<'_> {
 
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
-    fn balance(&self, (subject, name): Step, base: &Meshed) -> Result<Check, Failure> {
+    fn balance(&self, (subject, name): Step, base: &LeafSet) -> Result<Check, Failure> {
+        let left_out = |why| Ok(Check::new(subject, name, Outcome::left_out(why)));
         let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
-        let written = plain(case).write(&self.place.join("plain-case"), StlForm::Any)?;
+        let written = plain(case).write(&self.place.join("plain-case"), self.engine().takes.stl)?;
+        let case = Case::read(&written).map_err(io::Error::other)?;
+        if let Some(why) = self.engine().declines(&case) {
+            return left_out(why);
+        }
         let mesh = self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh;
-        match self.balance_by_p4est(&base.place) {
+        match self.balance_by_p4est(&base.words) {
             Ok(words) => {
-                let root = &base.mesh.manifest.root;
-                let compared = identical::compare(&sideless(&mesh.words), &words, root);
+                let compared =
+                    identical::compare(&sideless(&mesh.words), &words, &base.manifest.root);
                 Ok(Check::of_result(subject, CheckResult { name, ..compared }))
             }
             Err(Failure { end: End::Exited { code: EXIT_TOO_DEEP, .. }, .. }) => {
-                let why = "the base tree has leaves of level 19, p4est stops at 18";
-                Ok(Check::new(subject, name, Outcome::left_out(why)))
+                left_out("the base tree has leaves of level 19, p4est stops at 18".to_owned())
             }
             Err(failure) => Err(failure),
         }
     }
 
-    fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
-        let out = self.place.join("p4est");
-        fs::create_dir_all(&out)?;
+    /// The files of the engine may have other names, or a tree in place of words.
+    fn balance_by_p4est(&self, base: &[u64]) -> Result<Vec<u64>, Failure> {
+        let [tree, out] = ["p4est/base", "p4est"].map(|name| self.place.join(name));
+        fs::create_dir_all(&tree)?;
+        npy::write(&tree.join("leaves-00000.npy"), base)?;
         let mut command = Command::new(&self.all.programs.paths.p4est);
-        command.arg(base).arg(&out);
+        command.arg(tree).arg(&out);
         layout::set_environment(&mut command);
         let _files = layout::own_directory(&mut command);
         process::run(&mut command, &Watch::new("p4est", self.all.options.timeout, &out))?;
@@ -173,6 +179,7 @@ pub fn proven(
         }
         Err(failure) => return Err(failure),
     }
+    proof.needs_objects(NO_LEAVES);
     Ok(proof)
 }
 
@@ -203,14 +210,10 @@ fn count(step: Step, case: &Case, sample: &Sample, answers: &[Answer]) -> Check 
         )),
         (None, None) => Outcome::held(ballot.decisive()),
     };
-    let mut notes = ballot.notes();
-    if sample.in_band > 0 {
-        let (leaves, band) = (sample.in_band, sample.band);
-        let note = format!(
-            "{leaves} leaves within {band:.3e} of the surface were not given to the oracles"
-        );
-        notes.insert(0, note);
-    }
+    let &Sample { in_band, band, .. } = sample;
+    let near = "of the surface were not given to the oracles";
+    let near = (in_band > 0).then(|| format!("{in_band} leaves within {band:.3e} {near}"));
+    let notes = near.into_iter().chain(ballot.notes()).collect();
     Check { notes, ..Check::new(step.0, step.1, outcome) }
 }
 
