@@ -119,6 +119,11 @@ fn output_that_cannot_be_written_is_an_exit_code() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
     let ended = command.args(["track", "missing.jsonl"]).stderr(full()).status().unwrap();
     assert_eq!(ended.code(), Some(2));
+    // A finding comes first.
+    let open = concat!(env!("CARGO_MANIFEST_DIR"), "/../../geometries/cube_open.stl");
+    let ended = harness(&["geometry", open, "--json", "/dev/full"]);
+    let message = String::from_utf8(ended.stderr).unwrap();
+    assert!(ended.status.code() == Some(1) && message.contains("/dev/full"), "{message}");
 }
 
 #[test]

@@ -104,6 +104,8 @@ fn a_leak_is_described_in_text_and_json() {
     assert!((width / 2.0 - 1.0).abs() < 0.05, "{width}");
     let closes = answer["closes"]["spacing"].as_f64().unwrap();
     assert!((2.0 / 3.47..=4.0).contains(&closes), "{closes}");
+    let (code, text) = fixture.leak(&["--from", "0,0,0", "--json", "/dev/full"]);
+    assert!(code == 1 && text.contains("LEAK") && text.contains("a report could not"), "{text}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
 use crate::options::{self, Output, examples, root};
-use crate::output::put;
+use crate::output::put_forms;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Result};
 use contract::lattice::Root;
@@ -42,10 +42,10 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
     let diagnosis = diagnose(&Input::read(&arguments.file, requested)?, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
-    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(&diagnosis)))?;
-    Ok(match () {
+    let code = match () {
         () if diagnosis.changes_region => EXIT_FAILED,
         () if diagnosis.is_incomplete() => EXIT_MISSING,
         () => EXIT_HOLDS,
-    })
+    };
+    put_forms(code, &[(arguments.json.as_deref(), &|| pretty(&diagnosis))], None)
 }

@@ -1,7 +1,7 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use crate::options::{Output, examples, point, whole_seconds};
-use crate::output::put;
+use crate::output::put_forms;
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Result, Watch};
@@ -92,7 +92,6 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let answers = leaks.answers(&ends)?;
     Progress.finish();
     Progress.check()?;
-    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(&answers)))?;
     if ends.is_empty() {
         println!(
             "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (one that is open at all three is not examined: --from)",
@@ -100,7 +99,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         );
     }
     print!("{answers}");
-    Ok(if answers.examined.iter().any(|report| report.is_leak) { EXIT_FAILED } else { EXIT_HOLDS })
+    let is_any = answers.examined.iter().any(|report| report.is_leak);
+    let code = if is_any { EXIT_FAILED } else { EXIT_HOLDS };
+    put_forms(code, &[(arguments.json.as_deref(), &|| pretty(&answers))], None)
 }
 
 /// What to do where there is no start.
