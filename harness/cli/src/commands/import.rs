@@ -38,7 +38,7 @@ pub struct Source {
     /// The case that was meshed, for its root and requirements: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE", conflicts_with = "root")]
     case: Option<String>,
-    /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: the sides are unknown]
+    /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: `side` in a file that the harness or the mesher wrote for VTK, or else unknown]
     #[arg(long, value_name = "NAME")]
     sides: Option<String>,
     /// What x, y and z are in a table
@@ -50,16 +50,17 @@ pub struct Source {
 }
 
 impl Source {
+    /// Whether an option states the place of cells or their sides.
+    fn describes_cells(&self) -> bool {
+        self.root.is_some() || self.sides.is_some() || self.position != Position::default()
+    }
+
     /// Refuses options that have no effect, because each of the meshes is a leaf-set directory.
     ///
     /// # Errors
     /// If any is given.
     pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
-        let Self { format, root, case: _, sides, position, timeout: _ } = self;
-        let is_given = format.is_some()
-            || root.is_some()
-            || sides.is_some()
-            || *position != Position::default();
+        let is_given = self.format.is_some() || self.describes_cells();
         let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
         let why = "has a manifest, which states root and sides: omit the options for them";
         Failure::unless(is_used, format!("{} {why}", meshes[0].display()))
@@ -70,9 +71,8 @@ impl Source {
     /// # Errors
     /// If the file is damaged.
     pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>> {
-        let Self { format, root, case, sides, .. } = self;
-        let is_one_mesh = root.is_some() || case.is_some() || sides.is_some();
-        if is_one_mesh || format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
+        let is_one_mesh = self.case.is_some() || self.describes_cells();
+        if is_one_mesh || self.format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
             return Ok(None);
         }
         Ok(Some(forest::read(mesh).map_err(|error| error.of_file(mesh))?))
