@@ -102,7 +102,7 @@ pub fn triangle(facet: &FacetLattice) -> Triangle {
 }
 
 /// The corners of a facet in the same direction around it, from the least one.
-fn from_least(mut corners: FacetLattice) -> FacetLattice {
+pub fn from_least(mut corners: FacetLattice) -> FacetLattice {
     let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
     corners.rotate_left(least);
     corners

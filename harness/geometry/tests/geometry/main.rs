@@ -225,7 +225,9 @@ fn a_solid_that_appears_twice_with_other_diagonals_changes_the_region() {
         })
         .collect::<Vec<_>>();
     let reversed = other.iter().map(|&[a, b, c]| [c, b, a]).collect();
-    for other in [other, reversed] {
+    // In the file, other vertices; on the lattice, the same.
+    let copy = cuboid([1e-9; 3], [4.0; 3]);
+    for other in [other, reversed, copy] {
         let found = diagnosis([cube(), other].concat(), Some(0.25));
         assert!(found.changes_region, "{found}");
     }
@@ -428,6 +430,8 @@ fn facets_on_and_beyond_the_root_are_found() {
 #[test]
 fn json_has_the_schema_and_text_the_findings() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
+    let solids = diagnosis(cube().repeat(5_000), Some(0.5));
+    assert_eq!((count(&solids, Kind::Overlaps), solids.changes_region), (12, true));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
     assert_eq!(json["schema"], "octree-geometry/6");
     assert_eq!(json["findings"][0]["kind"], "openings");
