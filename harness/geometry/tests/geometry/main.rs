@@ -115,6 +115,15 @@ fn vertices_that_f32_numbers_cannot_hold_are_found() {
         let found = diagnose(&Input::new(facets.clone(), requested).unwrap(), 5);
         assert_eq!(count(&found, Kind::Rounded), rounded);
     }
+    // All but the lower face reach into a box with finer cells.
+    let text = "spacing_min = 2.0\nroot = { origin = [-16.0, 4999984.0, -16.0], edge = 32.0 }\n\
+        [generator]\nshape = 'cube'\nfacets = 12\nedge = 4.0\ncentre = [2.0, 5000002.0, 2.0]\n\
+        [[box]]\nmin = [-9.0, 4999990.0, 3.5]\nmax = [9.0, 5000010.0, 9.0]\nspacing = 0.5\n";
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("far.toml");
+    std::fs::write(&path, text).unwrap();
+    let found = diagnose(&Input::read(&path, Requested::default()).unwrap(), 5);
+    assert_eq!((count(&found, Kind::Rounded), found.changes_region), (10, true));
 }
 
 #[test]
@@ -348,6 +357,11 @@ fn facets_without_area_have_no_effect_unless_they_are_apart() {
     let stray = vec![(Kind::Stray, 3)];
     assert_eq!((counts(&found), found.facets - found.shells.facets), (stray, 5));
     assert!(found.changes_region && found.finding(Kind::Stray).unwrap().count_changing == 3);
+    // The other diagonal of a face lies on it, that of the cube does not.
+    for (from, to, stray) in [([4.0, 0.0, 4.0], [0.0, 4.0, 4.0], 0), ([4.0; 3], [0.0; 3], 1)] {
+        let found = diagnosis([cube(), vec![[from, to, to]]].concat(), Some(0.25));
+        assert_eq!((count(&found, Kind::Stray), found.changes_region), (stray, stray > 0));
+    }
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
     assert_eq!((counts(&point), point.shells.facets), (vec![(Kind::Stray, 1)], 0));
 }
@@ -416,6 +430,8 @@ fn many_copies_of_two_facets_take_no_longer_than_others() {
     assert_eq!(count(&found, Kind::Duplicates), 2 * 19_999);
     assert_eq!((count(&found, Kind::Intersections), count(&found, Kind::ThinGaps)), (1, 2));
     assert!(found.findings.iter().all(|finding| !finding.is_lower_bound));
+    let solids = diagnosis(cube().repeat(5_000), Some(0.5));
+    assert_eq!((count(&solids, Kind::Overlaps), solids.changes_region), (12, true));
 }
 
 #[test]
@@ -430,8 +446,6 @@ fn facets_on_and_beyond_the_root_are_found() {
 #[test]
 fn json_has_the_schema_and_text_the_findings() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
-    let solids = diagnosis(cube().repeat(5_000), Some(0.5));
-    assert_eq!((count(&solids, Kind::Overlaps), solids.changes_region), (12, true));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
     assert_eq!(json["schema"], "octree-geometry/6");
     assert_eq!(json["findings"][0]["kind"], "openings");
