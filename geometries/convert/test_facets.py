@@ -1,7 +1,10 @@
 """Tests of the readers and the writer. Run with: python3 -m unittest discover -s geometries/convert"""
 
 import struct
+import subprocess
+import sys
 import unittest
+from pathlib import Path
 
 import facets
 
@@ -75,6 +78,13 @@ class Readers(unittest.TestCase):
         self.assertEqual(len(data), 84 + 2 * 50)
         self.assertEqual(struct.unpack_from("<I3f", data, 80), (2, 0, 0, 1))
         self.assertEqual(struct.unpack_from("<6f", data, 134), (0, 0, 0, 1, 1, 1))
+
+
+class Fetch(unittest.TestCase):
+    def test_an_output_that_is_no_directory_is_an_invalid_argument(self):
+        fetch = Path(__file__).resolve().parents[1] / "fetch"
+        ended = subprocess.run([sys.executable, fetch, "evtol", "--into", __file__], capture_output=True, text=True)
+        self.assertEqual((ended.returncode, "Traceback" in ended.stderr), (2, False), ended.stderr)
 
 
 if __name__ == "__main__":

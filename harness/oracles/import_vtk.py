@@ -6,6 +6,7 @@ the digest of their leaves. Unless another array is requested, their sides are t
 """
 
 import itertools
+import os
 from xml.etree import ElementTree
 
 import numpy as np
@@ -159,6 +160,13 @@ def of_export(path, grid, edges):
     return {"origin": root[:3], "edge": root[3]}, digest
 
 
+def is_own_tree(path):
+    """Whether the mesher or `harness export` wrote this hyper-tree grid: only they state the edge of the root, at the end of the file."""
+    with open(path, "rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - 4096))
+        return b"RootEdge" in file.read()
+
+
 def fields(path, grid):
     """The fields `root` and `digest` of the file, or None. For a .pvtu, VTK returns the fields of a part, which are those of the whole if
     VTK has written both; other programs write them as text."""
@@ -266,7 +274,7 @@ def cells(path, request):
     data, name = read(path), request["sides"]
     if data is not None and data.IsA("vtkHyperTreeGrid"):
         corners, edges, nodes, root = of_hyper_trees(data)
-        digest = None
+        digest, name = None, name or ("side" if is_own_tree(path) else None)
     elif data is not None and data.IsA("vtkUnstructuredGrid"):
         (corners, edges), nodes = of_unstructured(data), slice(None)
         root, digest = of_export(path, data, edges)
@@ -274,9 +282,10 @@ def cells(path, request):
         if ghosts is not None:
             nodes = np.flatnonzero(vtk_to_numpy(ghosts) & NOT_OF_MESH == 0)
             corners, edges = corners[nodes], edges[nodes]
-        if digest is not None and data.GetCellData().HasArray("side"):
-            name = name or "side"
-            digest = digest if name == "side" else None
+        if digest is not None:
+            name = name or ("side" if data.GetCellData().HasArray("side") else None)
+            # That of the leaves with the sides of the export, or with none.
+            digest = digest if name in ("side", None) else None
     else:
         raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
     sides = cell_array(data, name)[nodes] if name else None

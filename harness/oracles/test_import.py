@@ -198,6 +198,22 @@ class ImportTest(unittest.TestCase):
                 keys = ["digest", "root", "leaves_by_level", "leaves_by_side"]
                 for key in keys + ["level_surface", "keep"] * bool(options):
                     self.assertEqual(manifest[key], expected[key], key)
+            # In another root, VTK reads the tree, and the sides are known as well.
+            file, root = self.at / f"{keep}.vtkhdf", expected["root"]
+            self.assertEqual(run("harness", "export", mesh, file)[0], 0)
+            _, manifest = self.imported(file, "--root", ",".join(map(repr, [*root["origin"], 2 * root["edge"]])))
+            self.assertEqual(manifest["leaves_by_side"], expected["leaves_by_side"])
+
+    def test_sides_that_another_program_adds_to_an_exported_mesh(self):
+        mesh, file = self.at / "mesh", self.at / "mesh.vtu"
+        self.assertEqual(run("harness", "import", samples() / "unitcube.p8est", "--out", mesh)[0], 0)
+        self.assertEqual(run("harness", "export", mesh, file)[0], 0)
+        grid = pyvista.read(file)
+        grid.cell_data["body"] = np.ones(grid.n_cells, np.int32)
+        grid.save(file)
+        words, manifest = self.imported(file, "--sides", "body")
+        self.assertNotIn("sides", manifest)
+        self.assertTrue((words & 3 == 1).all())
 
     def test_part_of_a_mesh_is_imported_with_the_root_of_the_whole(self):
         mesh = self.at / "whole"

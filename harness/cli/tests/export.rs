@@ -117,9 +117,13 @@ fn a_poly_mesh_is_a_directory_of_a_case() {
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(output.starts_with("case/constant/polyMesh: 148 cells, "), "{output}");
     assert!(output.contains("faces of each patch: xMin "), "{output}");
+    assert!(output.contains("the geometry crosses cells"), "{output}");
     let files = ["boundary", "cellLevel", "faces", "neighbour", "owner", "points", "rank", "side"];
     assert_eq!(names(&place.path().join("case/constant/polyMesh")), files);
     assert_eq!(names(place.path()), ["case", "mesh"]);
+    // None of the cells that are left crosses.
+    let (code, output, _) = export(&place, "inner/polyMesh", &["--level-max", "1"]);
+    assert!(code == 0 && !output.contains("crosses"), "{output}");
 }
 
 #[test]

@@ -95,6 +95,8 @@ fn foreign_meshes_are_audited_without_a_manifest() {
     assert!(code == 0 && output.contains("balance    holds, 108 examined"), "{output}");
     let (code, output, _) = result(&["audit", &sample("brick.p8est"), "--root", "0,0,0,4"]);
     assert!(code == 1 && output.contains("has a hole across a face"), "{output}");
+    let (code, _, error) = result(&["audit", &sample("brick.p8est"), "--position", "centre"]);
+    assert!(code == 2 && error.contains("the position of cells is for tables"), "{error}");
 }
 
 #[test]

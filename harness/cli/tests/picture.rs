@@ -107,6 +107,8 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         ("mesh --out a.svg --slice z=9", 2, "--slice z=9"),
         ("mesh --out a.svg --slice z=0 --level-max 0", 2, "no leaf of the selection"),
         ("mesh --out a.svg --slice z=0 --clip -1,-1,0.3,1,1,0.9", 2, "no leaf of the selection"),
+        // Beyond the box in the same leaves.
+        ("mesh --out a.svg --slice z=1.7 --clip 0,0,1.1,1,1,1.3", 2, "no leaf of the selection"),
         ("mesh --out a.svg --case other.toml", 2, "the mesh is not of the case other"),
         ("mesh --out a.svg --zoom 0", 2, "from 1 to 1000000"),
         ("mesh --out a.svg --zoom -3", 2, "unexpected argument '-3' found; see --help"),

@@ -43,7 +43,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let mut out = TreeWriter::new(out, shape.clone()).map_err(named)?;
         let mut deflater = Deflater::default();
         for index in 0..shape.windows() {
-            options.check()?;
+            options.watch.check()?;
             let mut window = Window::new(index);
             if index == 0 {
                 window.put_root(siblings(&[tree.root()]));

@@ -60,7 +60,7 @@ impl Leaves {
     /// If the mesh cannot be read, or if the user interrupts.
     pub fn read(export: &Export<'_>, takes: &mut dyn FnMut(&Leaf, bool) -> bool) -> Result<Self> {
         let mut words = Vec::new();
-        export.mesh.leaves(&|| export.options.check(), &|_| true, &mut |leaf| {
+        export.mesh.leaves(&|| export.options.watch.check(), &|_| true, &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
                 let word = word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side });

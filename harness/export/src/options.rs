@@ -30,7 +30,7 @@ pub struct Export<'a> {
 impl Export<'_> {
     /// Visits the selected leaves in Morton order. All leaves are read once.
     pub(crate) fn visit(&self, visit: Each<'_>) -> Result<()> {
-        self.selection.visit(self.mesh, &|| self.options.check(), visit)
+        self.selection.visit(self.mesh, &|| self.options.watch.check(), visit)
     }
 
     /// Number of selected leaves, which is not 0.
@@ -95,20 +95,12 @@ pub enum Regions {
 }
 
 impl Options<'_> {
-    /// Whether to continue.
+    /// Whether to continue in a loop of fast steps, of which `count` are done. Most calls do not ask.
     ///
     /// # Errors
     /// If the user has interrupted the export.
-    pub fn check(&self) -> Result<()> {
-        self.watch.check()
-    }
-
-    /// The same in a loop of fast steps, of which `count` are done. Most calls do not ask.
-    ///
-    /// # Errors
-    /// As [`Self::check`].
     pub fn check_at(&self, count: u64) -> Result<()> {
-        if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
+        if count.is_multiple_of(1 << 14) { self.watch.check() } else { Ok(()) }
     }
 }
 

@@ -65,8 +65,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    let why = "more quadrants fill the root; an import with --sides data omits them";
-    let notes = vec![format!("{} {why}", count - leaves)];
+    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root";
+    let notes = vec![format!("{} {what}", count - leaves)];
     Ok(Summary { leaves, bytes, notes })
 }
 
@@ -189,7 +189,7 @@ mod tests {
             let (dir, summary) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let fillers = quadrants_saved(&path) - words.len() as u64;
-            prop_assert!(summary.notes[0].starts_with(&format!("{fillers} more")), "{summary:?}");
+            prop_assert!(summary.notes[0].starts_with(&format!("{fillers} more quadrants, whose data are 3 (in MFEM: attribute 4)")), "{summary:?}");
             let set = import(&path, true);
             prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
             prop_assert_eq!(set.manifest.root, ROOT);

@@ -34,9 +34,10 @@ pub struct Slice {
 impl Slice {
     /// The plane at a coordinate in the user's units; `None` if it does not meet the root.
     pub fn new(root: &Root, axis: usize, coordinate: f64) -> Option<Self> {
-        let position = (coordinate - root.origin[axis]) / root.edge;
-        let at = (position * UNITS_PER_EDGE as f64).round_ties_even() as i64;
-        (0.0..=1.0).contains(&position).then_some(Self { axis, at })
+        let units = UNITS_PER_EDGE as f64;
+        // Rounding comes first, as the sum of corner and edge may lie beyond the root.
+        let at = ((coordinate - root.origin[axis]) / root.edge * units).round_ties_even();
+        (0.0..=units).contains(&at).then_some(Self { axis, at: at as i64 })
     }
 
     /// The layer of level-19 cells that the plane cuts.
@@ -154,6 +155,10 @@ mod tests {
             assert_eq!(cut.len(), 4, "{coordinate}");
             assert!(cut.iter().all(|d| d & 1 == digit), "{coordinate}");
         }
+        // The sum of this corner and edge is beyond the root by a rounding error.
+        let rounded = Root { origin: [0.1; 3], edge: 0.3 };
+        let last = Slice::new(&rounded, 2, 0.1 + 0.3).unwrap();
+        assert_eq!((last.at, last.layer()), (UNITS_PER_EDGE, CELLS_PER_EDGE - 1));
         assert_eq!(Slice::new(&root, 0, 1.1), None);
         assert_eq!(Slice::new(&root, 0, f64::NAN), None);
     }

@@ -4,12 +4,13 @@
 //! that they have, and no ray counts them.
 
 use contract::case::Facet;
-use contract::lattice::{self, FacetLattice, normal, sorted};
+use contract::lattice::{self, normal, sorted};
 use serde::Serialize;
 use std::collections::{HashMap, HashSet};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use super::tree::{FacetTree, Point, TOUCHING};
 
 /// One facet at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,17 +128,21 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
     findings
 }
 
-/// Facets without area with a vertex that no facet with area has. A facet at those of others, as of a T-junction, changes nothing.
-pub fn stray(input: &Input, edges: &Edges, first: usize) -> Finding {
+/// Facets without area with a vertex that no facet with area has, or with an edge whose middle is on none, as where a strip of triangles
+/// continues elsewhere. A facet at those of others, as of a T-junction, changes nothing.
+pub fn stray(input: &Input, edges: &Edges, tree: &FacetTree, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Stray);
-    let has_area = |of: &FacetLattice| normal(of) != [0; 3];
-    let (flat, others): (Vec<_>, Vec<_>) = (0u32..)
-        .zip(&edges.corners)
-        .zip(&input.case.facets_lattice)
-        .partition(|of| !has_area(of.1));
-    let used: HashSet<u32> = others.iter().flat_map(|((_, corners), _)| **corners).collect();
-    for ((facet, corners), _) in flat {
-        if !corners.iter().all(|corner| used.contains(corner)) {
+    let has_area = |facet: &u32| normal(&input.case.facets_lattice[*facet as usize]) != [0; 3];
+    let is_off = |[p, q]: [[i64; 3]; 2]| {
+        let middle = Point::from_array([0, 1, 2].map(|a| (p[a] + q[a]) as f64 / 2.0));
+        !tree.within(middle, TOUCHING).iter().any(has_area)
+    };
+    let facets = (0..).zip(&edges.corners);
+    let (others, flat): (Vec<_>, Vec<_>) = facets.partition(|(facet, _)| has_area(facet));
+    let used: HashSet<u32> = others.iter().flat_map(|(_, corners)| **corners).collect();
+    for (facet, corners) in flat {
+        let mut ends = lattice::edges(&input.case.facets_lattice[facet as usize]).into_iter();
+        if !corners.iter().all(|corner| used.contains(corner)) || ends.any(is_off) {
             finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
     }

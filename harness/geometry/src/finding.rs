@@ -7,6 +7,7 @@ use contract::octant::CELLS_PER_EDGE;
 use serde::Serialize;
 
 use super::input::Input;
+use super::tree::bounds;
 
 /// Kinds of findings, in the order of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -22,7 +23,7 @@ pub enum Kind {
     InsideOut,
     /// Closed shells that lie in an odd number of other closed ones.
     Nested,
-    /// Facets without area with a vertex that no facet with area has.
+    /// Facets without area with a vertex that no facet with area has, or an edge whose middle is on none.
     Stray,
     /// Facets with the three vertices of an earlier facet, in any order. The kinds below count copies of the same winding once.
     Duplicates,
@@ -145,10 +146,12 @@ impl Kind {
 }
 
 /// Facets with a coordinate near which f32 numbers are more than half a cell apart.
-pub fn rounded(input: &Input, cell: f64, first: usize) -> Finding {
+pub fn rounded(input: &Input, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Rounded);
-    for (facet, corners) in (0..).zip(&input.case.facets) {
-        let far = corners.as_flattened().iter().fold(0f32, |far, c| far.max(c.abs()));
+    for (facet, corners) in (0..).zip(input.case.facets.chunks(1)) {
+        let all = corners.as_flattened().as_flattened();
+        let far = all.iter().fold(0f32, |far, c| far.max(c.abs()));
+        let cell = input.cell_in(&bounds(corners)).unwrap_or(f64::INFINITY);
         if f64::from(far.next_up() - far) > cell / 2.0 {
             finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
@@ -177,7 +180,19 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
     let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
     match finding.kind {
-        Kind::Openings => openings(finding, input, (width, finest)),
+        Kind::Openings if width < finest => {
+            "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
+        }
+        Kind::Openings if input.cell.is_none() || finding.count_changing == 0 => format!(
+            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest may leak. {meaning}",
+            number(width)
+        ),
+        // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
+        Kind::Openings => format!(
+            "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
+             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
+            finding.count_changing, finding.count, number(width)
+        ),
         Kind::Duplicates if finding.count_changing == 0 => {
             "No effect: each of these facets appears an odd number of times, which rays pass like one.".into()
         }
@@ -194,27 +209,6 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         ),
         _ => meaning.into(),
     }
-}
-
-/// The effect of openings, of which the widest is given.
-fn openings(finding: &Finding, input: &Input, (widest, finest): (f64, f64)) -> String {
-    let (_, meaning) = finding.kind.row();
-    if widest < finest {
-        return "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into();
-    }
-    let widest = number(widest);
-    if input.cell.is_none() || finding.count_changing == 0 {
-        return format!(
-            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {widest} or less the widest may leak. \
-             {meaning}"
-        );
-    }
-    // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
-    format!(
-        "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {widest}. {meaning} Below 3.5 cells that \
-         depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
-        finding.count_changing, finding.count
-    )
 }
 
 #[cfg(test)]

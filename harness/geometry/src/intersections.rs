@@ -10,7 +10,9 @@ use contract::parity::Parity;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::shells::Shells;
-use super::tree::FacetTree;
+use super::tree::{FacetTree, from_least};
+use std::collections::HashMap;
+use std::iter::repeat_n;
 
 /// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or is back to back in
 /// one plane. Neither makes two volumes overlap.
@@ -56,14 +58,20 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
 /// Facets with an even number of solids on their inner side, in the middle. The surfaces that bound them may cross only where facets of both have
 /// edges, so that no pair intersects. Only closed shells of consistent winding count.
 pub fn overlaps(input: &Input, tree: &FacetTree, shells: &Shells, first: usize) -> Finding {
-    let solids = tree.firsts.iter().filter_map(|&f| {
+    let outward = |f: u32| {
         let [a, b, c] = input.case.facets_lattice[f as usize];
-        Some((f, if shells.outward(f)? { [a, b, c] } else { [a, c, b] }))
-    });
-    let (numbers, facets): (Vec<u32>, Vec<FacetLattice>) = solids.unzip();
-    let (parity, mut finding) = (Parity::new(&facets), Finding::new(Kind::Overlaps));
-    for (&f, facet) in numbers.iter().zip(&facets).filter(|(_, facet)| normal(facet) != [0; 3]) {
-        let n = normal(facet).map(|c| c as f64);
+        Some(if shells.outward(f)? { [a, b, c] } else { [a, c, b] })
+    };
+    let mut copies: HashMap<FacetLattice, usize> = HashMap::new();
+    for facet in (0..).zip(&shells.of).filter_map(|(f, _)| outward(f)) {
+        *copies.entry(from_least(facet)).or_default() += 1;
+    }
+    // Rays count all copies, but an even number of them is like two, and an odd one like one.
+    let all: Vec<_> = copies.into_iter().flat_map(|(f, n)| repeat_n(f, 2 - n % 2)).collect();
+    let (parity, mut finding) = (Parity::new(&all), Finding::new(Kind::Overlaps));
+    let solids = tree.firsts.iter().filter_map(|&f| Some((f, outward(f)?)));
+    for (f, facet) in solids.filter(|(_, facet)| normal(facet) != [0; 3]) {
+        let n = normal(&facet).map(|c| c as f64);
         let step = 3.0 * ROUNDING / n.iter().map(|c| c * c).sum::<f64>().sqrt();
         let behind =
             |a: usize| (facet[0][a] + facet[1][a] + facet[2][a]) / 3 - (step * n[a]).round() as i64;

@@ -32,14 +32,14 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let mut findings = vec![openings::openings(input, &edges, first)];
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
-    findings.push(edges::stray(input, &edges, first));
-    findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
+    findings.push(edges::stray(input, &edges, &tree, first));
+    findings.push(edges::duplicates(input, &edges, first));
     findings.push(intersections::intersections(input, &tree, &shells, first));
     findings.push(intersections::overlaps(input, &tree, &shells, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, &shells, cell));
-        findings.push(finding::rounded(input, cell, first));
+        findings.push(finding::rounded(input, first));
     }
     findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {

@@ -15,13 +15,10 @@ use std::collections::HashSet;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::shells::Shells;
-use super::tree::{Aabb, FacetTree, Point};
+use super::tree::{Aabb, FacetTree, Point, TOUCHING};
 
 /// The cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
-
-/// Facets that touch are no sheet: a nearer one, in lattice units, is there by rounding.
-const TOUCHING: f64 = 2.0;
 
 /// The quantile of the width that is reported, by area.
 const QUANTILE: f64 = 0.05;

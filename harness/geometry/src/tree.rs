@@ -12,6 +12,9 @@ use parry3d_f64::shape::{Segment, Triangle};
 use std::cell::RefCell;
 use std::collections::HashSet;
 
+/// What touches a facet is no farther from it than this, in lattice units: it is apart by rounding.
+pub const TOUCHING: f64 = 2.0;
+
 /// The facets. Those without area count too: they cross leaves like all others.
 pub struct FacetTree {
     triangles: Vec<Triangle>,
@@ -102,7 +105,7 @@ pub fn triangle(facet: &FacetLattice) -> Triangle {
 }
 
 /// The corners of a facet in the same direction around it, from the least one.
-fn from_least(mut corners: FacetLattice) -> FacetLattice {
+pub fn from_least(mut corners: FacetLattice) -> FacetLattice {
     let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
     corners.rotate_left(least);
     corners

@@ -57,8 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     ];
     let of_format = |name| format.options.contains(name);
     if let Some((name, _)) = given.iter().find(|(name, is_given)| *is_given && !of_format(name)) {
-        let ending = format.ending;
-        return Err(Failure::input(format!("{name} has no effect on {ending}: omit it")));
+        return Err(Failure::input(format!("{name} has no effect on {}: omit it", format.ending)));
     }
     if format.ending != "/polyMesh" {
         files::check_writable(file).map_err(|error| Failure::at(file, error))?;

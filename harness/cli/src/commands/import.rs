@@ -38,7 +38,7 @@ pub struct Source {
     /// The case that was meshed, for its root and requirements: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE", conflicts_with = "root")]
     case: Option<String>,
-    /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: the sides are unknown]
+    /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: `side` in a file that the harness or the mesher wrote for VTK, or else unknown]
     #[arg(long, value_name = "NAME")]
     sides: Option<String>,
     /// What x, y and z are in a table
@@ -50,8 +50,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// Whether options state what places and sides the cells of one mesh have.
-    fn is_of_cells(&self) -> bool {
+    /// Whether an option states the place of cells or their sides.
+    fn describes_cells(&self) -> bool {
         self.root.is_some() || self.sides.is_some() || self.position != Position::default()
     }
 
@@ -60,7 +60,7 @@ impl Source {
     /// # Errors
     /// If any is given.
     pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
-        let is_given = self.format.is_some() || self.is_of_cells();
+        let is_given = self.format.is_some() || self.describes_cells();
         let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
         let why = "has a manifest, which states root and sides: omit the options for them";
         Failure::unless(is_used, format!("{} {why}", meshes[0].display()))
@@ -71,7 +71,7 @@ impl Source {
     /// # Errors
     /// If the file is damaged.
     pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>> {
-        let is_one_mesh = self.case.is_some() || self.is_of_cells();
+        let is_one_mesh = self.case.is_some() || self.describes_cells();
         if is_one_mesh || self.format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
             return Ok(None);
         }

@@ -24,7 +24,7 @@ use contract::failure::{Failure, Result};
 use contract::files::{Staging, nearest_directory};
 use contract::number::numbered;
 use contract::sets::Sets;
-use contract::word::{self, Side};
+use contract::word;
 use geometry::tree::{FacetTree, Point};
 
 use crate::leaves::{Content, Leaves, Square};
@@ -63,14 +63,13 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     for file in fs::read_dir(&dir).map_err(named)? {
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
-    export.options.check()?;
+    export.options.watch.check()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));
         moved.and_then(|()| fs::rename(&dir, path)).map_err(named)
     })?;
     let mut notes = of_mesh.notes(export.options.regions);
-    let is_selected = export.selection.side.is_none_or(|side| side == Side::Crossing);
-    if is_selected && export.mesh.manifest.leaves_by_side.crossing > 0 {
+    if of_mesh.leaves.cells().any(word::is_crossing) {
         notes.push(CROSSED.to_owned());
     }
     Ok(Summary { leaves: of_mesh.leaves.count().into(), bytes, notes })

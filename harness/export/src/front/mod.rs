@@ -152,7 +152,7 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
         out.flush().map_err(|error| Failure::at(path, error))?;
-        export.options.check()
+        export.options.watch.check()
     })?;
     let closed = match open {
         0 => "closed".to_owned(),

@@ -73,7 +73,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
             data_bytes += piece.bytes.len() as u64;
             pieces.push(Piece { bytes: Vec::new(), ..piece });
             export.options.watch.progress(encoder.written.cells, leaves);
-            export.options.check()
+            export.options.watch.check()
         };
         export.visit(&mut |leaf| {
             if encoder.leaves.len() == PIECE {
@@ -88,7 +88,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
-        export.options.check()
+        export.options.watch.check()
     })?;
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }

@@ -36,6 +36,16 @@ pub enum Target {
     Point([f64; 3]),
 }
 
+impl Target {
+    /// The point on the lattice, if it is one.
+    fn on_lattice(self, root: &Root) -> Result<Option<Point>, String> {
+        match self {
+            Self::Far => Ok(None),
+            Self::Point(at) => on_lattice("--to", at, root).map(Some),
+        }
+    }
+}
+
 /// The ends of a path on the lattice; the second is `None` for the far field.
 type Ends = (Point, Option<Point>);
 
@@ -77,21 +87,15 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report> {
         let (root, level) = (&self.case.root, self.case.level_surface);
         let start = on_lattice("--from", from, root)?;
-        let end = match to {
-            Target::Far => None,
-            Target::Point(at) => Some(on_lattice("--to", at, root)?),
-        };
-        let ends = (start, end);
+        let ends = (start, to.on_lattice(root)?);
         self.make_tree(level)?;
         if let Some((what, at)) = self.crossed(level, ends) {
             return Err(Failure::input(why_crossed(what, at, &self.trees[&level], root)));
         }
         let spacing = Spacing::of(level, root);
-        let is_joined = self.search(level, ends, None)?;
+        let (is_leak, outside) = self.leaks(level, ends)?;
         let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
-        let is_enclosed = !is_joined && end.is_none() && is_outside && self.case.seeds.is_empty();
-        let outside = if is_joined && end.is_none() { self.closed(start)? } else { None };
-        let is_leak = is_joined && (outside.is_none() || self.search(level, ends, outside)?);
+        let is_enclosed = !is_leak && to == Target::Far && is_outside && self.case.seeds.is_empty();
         let (closes, passage) = (None, None);
         let mut report = Report { from, to, spacing, is_leak, is_enclosed, closes, passage };
         if is_leak {
@@ -110,6 +114,14 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             report.passage = Some(passage);
         }
         Ok(report)
+    }
+
+    /// Whether free leaves of a base tree join the ends, which lie in some; and the level whose outside is the far field, if that is not all of
+    /// the root's boundary.
+    fn leaks(&mut self, level: u8, ends: Ends) -> Result<(bool, Option<u8>)> {
+        let is_joined = self.search(level, ends, None)?;
+        let outside = if is_joined && ends.1.is_none() { self.closed(ends.0)? } else { None };
+        Ok((is_joined && (outside.is_none() || self.search(level, ends, outside)?), outside))
     }
 
     fn make_tree(&mut self, level: u8) -> Result<()> {
@@ -176,7 +188,8 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             leaks.iter().partition(|leak| level(leak) == finest);
         let mut points: Vec<_> = of_finest.iter().map(|leak| leak.point).collect();
         for leak in others {
-            if self.joined(finest, leak.point, &points[..of_finest.len()])?.is_none() {
+            let of_finest = &points[..of_finest.len()];
+            if self.joined(finest, Target::Point(leak.point), of_finest)?.is_none() {
                 points.push(leak.point);
             }
         }
@@ -189,29 +202,20 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     /// If the end is outside the root, or a base tree cannot be made.
     pub fn seed(&mut self, end: Target) -> Result<Option<[f64; 3]>> {
         let seeds = &self.case.seeds;
-        let joined = match end {
-            Target::Point(at) if seeds.len() > 1 => {
-                self.joined(self.case.level_surface, at, seeds)?
-            }
-            _ => None,
-        };
-        Ok(joined.or_else(|| seeds.first().copied()))
+        let [first, _, ..] = seeds[..] else { return Ok(seeds.first().copied()) };
+        Ok(self.joined(self.case.level_surface, end, seeds)?.or(Some(first)))
     }
 
     /// The first of some places that free leaves of the base tree of a level join to an end.
-    fn joined(
-        &mut self,
-        level: u8,
-        end: [f64; 3],
-        places: &[[f64; 3]],
-    ) -> Result<Option<[f64; 3]>> {
+    fn joined(&mut self, level: u8, end: Target, places: &[[f64; 3]]) -> Result<Option<[f64; 3]>> {
         let root = self.case.root;
-        let end = on_lattice("--to", end, &root)?;
+        let end = end.on_lattice(&root)?;
         self.make_tree(level)?;
         for &place in places {
             let Ok(at) = on_lattice("--from", place, &root) else { continue };
-            let ends = (end, Some(at));
-            if self.crossed(level, ends).is_none() && self.search(level, ends, None)? {
+            // A search from the smaller of two places ends sooner: that of a leak, not that of a flow.
+            let ends = end.map_or((at, None), |end| (end, Some(at)));
+            if self.crossed(level, ends).is_none() && self.leaks(level, ends)?.0 {
                 return Ok(Some(place));
             }
         }

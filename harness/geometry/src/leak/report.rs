@@ -137,12 +137,9 @@ impl fmt::Display for Answers {
         for (i, same) in self.examined.chunk_by(is_same).enumerate() {
             f.write_str(if i > 0 { "\n" } else { "" })?;
             same[0].fmt(f)?;
-            if same.len() > 1 {
-                writeln!(
-                    f,
-                    "          The same holds for {} more starts (--json).",
-                    same.len() - 1
-                )?;
+            let more = same.len() - 1;
+            if more > 0 {
+                writeln!(f, "          The same holds for {more} more starts (--json).")?;
             }
         }
         Ok(())

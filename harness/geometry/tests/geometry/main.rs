@@ -115,6 +115,15 @@ fn vertices_that_f32_numbers_cannot_hold_are_found() {
         let found = diagnose(&Input::new(facets.clone(), requested).unwrap(), 5);
         assert_eq!(count(&found, Kind::Rounded), rounded);
     }
+    // All but the lower face reach into a box with finer cells.
+    let text = "spacing_min = 2.0\nroot = { origin = [-16.0, 4999984.0, -16.0], edge = 32.0 }\n\
+        [generator]\nshape = 'cube'\nfacets = 12\nedge = 4.0\ncentre = [2.0, 5000002.0, 2.0]\n\
+        [[box]]\nmin = [-9.0, 4999990.0, 3.5]\nmax = [9.0, 5000010.0, 9.0]\nspacing = 0.5\n";
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("far.toml");
+    std::fs::write(&path, text).unwrap();
+    let found = diagnose(&Input::read(&path, Requested::default()).unwrap(), 5);
+    assert_eq!((count(&found, Kind::Rounded), found.changes_region), (10, true));
 }
 
 #[test]
@@ -225,7 +234,9 @@ fn a_solid_that_appears_twice_with_other_diagonals_changes_the_region() {
         })
         .collect::<Vec<_>>();
     let reversed = other.iter().map(|&[a, b, c]| [c, b, a]).collect();
-    for other in [other, reversed] {
+    // In the file, other vertices; on the lattice, the same.
+    let copy = cuboid([1e-9; 3], [4.0; 3]);
+    for other in [other, reversed, copy] {
         let found = diagnosis([cube(), other].concat(), Some(0.25));
         assert!(found.changes_region, "{found}");
     }
@@ -346,6 +357,11 @@ fn facets_without_area_have_no_effect_unless_they_are_apart() {
     let stray = vec![(Kind::Stray, 3)];
     assert_eq!((counts(&found), found.facets - found.shells.facets), (stray, 5));
     assert!(found.changes_region && found.finding(Kind::Stray).unwrap().count_changing == 3);
+    // The other diagonal of a face lies on it, that of the cube does not.
+    for (from, to, stray) in [([4.0, 0.0, 4.0], [0.0, 4.0, 4.0], 0), ([4.0; 3], [0.0; 3], 1)] {
+        let found = diagnosis([cube(), vec![[from, to, to]]].concat(), Some(0.25));
+        assert_eq!((count(&found, Kind::Stray), found.changes_region), (stray, stray > 0));
+    }
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
     assert_eq!((counts(&point), point.shells.facets), (vec![(Kind::Stray, 1)], 0));
 }
@@ -414,6 +430,8 @@ fn many_copies_of_two_facets_take_no_longer_than_others() {
     assert_eq!(count(&found, Kind::Duplicates), 2 * 19_999);
     assert_eq!((count(&found, Kind::Intersections), count(&found, Kind::ThinGaps)), (1, 2));
     assert!(found.findings.iter().all(|finding| !finding.is_lower_bound));
+    let solids = diagnosis(cube().repeat(5_000), Some(0.5));
+    assert_eq!((count(&solids, Kind::Overlaps), solids.changes_region), (12, true));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use contract::failure::{Failure, Result, Watch};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::Octant;
 use contract::testing::{assert_text, base_tree};
+use geometries::{Generator, Shape};
 use geometry::leak::Leaks;
 use geometry::leak::Target;
 use geometry::leak::report::{Answers, Report};
@@ -240,6 +241,25 @@ fn a_coarser_base_tree_that_cannot_be_meshed_is_no_answer() {
     let ends = [([0.0; 3], Target::Far)];
     let failure = Leaks::new(&case, tree, &Silent).unwrap().answers(&ends).unwrap_err();
     assert_eq!(failure.why, "no memory for level 7");
+}
+
+#[test]
+fn a_path_starts_at_the_first_seed_that_reaches_its_end() {
+    let mut closed = Generator::new(Shape::Cube, 12);
+    (closed.edge, closed.centre) = (Some(1.0), Some([2.5; 3]));
+    let facets = [hole(0.2).facets, closed.facets().unwrap()].concat();
+    let Root { origin, edge } = ROOT;
+    let text = format!(
+        "spacing_min = 0.0625\nseeds = [[2.5, 2.5, 2.5], [0.0, 0.0, 0.0]]\n[root]\norigin = {origin:?}\nedge = {edge:?}"
+    );
+    let case = Case::from_parts(&text, facets).unwrap();
+    let tree = |level| Ok(base_tree(&case.facets_lattice, level));
+    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+    for (end, seed) in
+        [(Target::Far, 0.0), (Target::Point([0.0, 0.0, 3.0]), 0.0), (Target::Point([2.6; 3]), 2.5)]
+    {
+        assert_eq!(leaks.seed(end).unwrap(), Some([seed; 3]), "{end:?}");
+    }
 }
 
 #[test]

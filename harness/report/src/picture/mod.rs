@@ -130,10 +130,13 @@ impl Picture {
         let slice = request.selection.slice;
         let slice = slice.unwrap_or_else(|| middle(&root, request.body, clip));
         let axes = plane_axes(slice.axis);
+        let a = slice.axis;
+        let is_within = clip.is_none_or(|[low, high]| (low[a]..=high[a]).contains(&slice.at));
+        Failure::unless(is_within, NO_LEAF)?;
         let clip = clip.unwrap_or_else(|| {
             let mut cube = zoomed(&root, request.body, request.zoom);
             // The plane need not be in the cube.
-            (cube[0][slice.axis], cube[1][slice.axis]) = (0, UNITS_PER_EDGE);
+            (cube[0][a], cube[1][a]) = (0, UNITS_PER_EDGE);
             cube
         });
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));

@@ -180,6 +180,18 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 }
 
 #[test]
+fn a_body_beyond_the_root_is_no_obstacle() {
+    let (place, mesh) = on_disk(vec![eight_and_seven()]);
+    // The sum of corner and edge is beyond this root by a rounding error.
+    let root = Root { origin: [0.1; 3], edge: 0.3 };
+    contract::manifest::Manifest { root, ..mesh.manifest }.write(place.path()).unwrap();
+    let mesh = Mesh::open(place.path()).unwrap();
+    let shown = Request { body: Some(&cube()), ..request(Colour::Level) };
+    let picture = Picture::collect(&mesh, &shown).unwrap();
+    assert_eq!((picture.slice.at, picture.squares.leaves), (UNITS_PER_EDGE, 4));
+}
+
+#[test]
 fn a_picture_has_the_format_of_its_name() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let svg = Picture::collect(&mesh, &request(Colour::Level)).unwrap().svg();

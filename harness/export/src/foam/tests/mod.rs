@@ -9,6 +9,7 @@ use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_with_sides};
+use contract::word::Side;
 use proptest::prelude::*;
 
 use super::*;
