@@ -85,9 +85,11 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     eprintln!("harness shrink: the case fails {first}");
     let limit = Duration::from_secs(arguments.budget);
     let shrunk = shrink(trial, &first, limit, |trial| probe.judge(trial))?;
-    let mut options = vec!["--engine", engine];
-    let mesher = given.mesher.as_deref().map(Path::to_string_lossy);
-    options.extend(mesher.iter().flat_map(|mesher| ["--mesher", mesher]));
+    let timeout = arguments.timeout.as_secs().to_string();
+    let mut options = vec!["--engine", engine, "--timeout", &timeout];
+    let programs = [("--mesher", &given.mesher), ("--reference", &given.reference)];
+    let given = programs.map(|(option, path)| Some((option, path.as_deref()?.to_string_lossy())));
+    options.extend(given.iter().flatten().flat_map(|(option, path)| [*option, path]));
     let readme = write(&shrunk, &options, &staging, &out).map_err(named)?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)

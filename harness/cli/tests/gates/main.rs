@@ -12,7 +12,7 @@ const SHRINK: &str = "shrink case.toml --engine engine.toml --ranks 8";
 #[test]
 fn a_failure_on_three_ranks_is_shrunk_to_its_two_facets() {
     let fixture = Fixture::new();
-    let outcome = fixture.harness(&format!("{SHRINK} --out tiny"));
+    let outcome = fixture.harness(&format!("{SHRINK} --timeout 50 --out tiny"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     let case = contract::case::Case::read(&fixture.path("tiny/case.toml")).unwrap();
     let mut positions: Vec<f32> = case.facets.iter().map(|facet| facet[0][0]).collect();
@@ -28,6 +28,7 @@ fn a_failure_on_three_ranks_is_shrunk_to_its_two_facets() {
     assert!(outcome.printed.contains("first difference: the mesh has"), "{}", outcome.printed);
     let readme = fs::read_to_string(fixture.path("tiny/README.md")).unwrap();
     let line = readme.lines().find(|line| line.contains("harness shrink")).unwrap().trim();
+    assert!(line.contains(" --timeout 50 "), "{line}");
     let again = fixture.harness(line.strip_prefix("harness ").unwrap());
     assert_eq!(again.code, 1, "{line}: {}", again.printed);
 }
