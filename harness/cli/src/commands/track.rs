@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     page: Option<Output>,
     /// Address of a commit for the links of the page, with {commit}, such as https://host/name/repository/commit/{commit}
-    #[arg(long, value_name = "URL")]
+    #[arg(long, value_name = "URL", requires = "page")]
     link: Option<String>,
     /// Write a test per metric as JUnit XML
     #[arg(long, value_name = "FILE")]
@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Exit code 1 (and a failed test) if the last change of a metric is for the worse and within its last N values
+    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
@@ -72,8 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else {
-        let without = "there is nothing to append: give --add or --value with --commit";
-        Failure::unless(arguments.commit.is_none(), without)?;
+        let without = "--commit and --repository are of what is appended: give --add or --value";
+        let is_alone = arguments.commit.is_some() || arguments.repository.is_some();
+        Failure::unless(!is_alone, without)?;
         let why = "is missing: give a history, or the first values with --add or --value";
         Failure::unless(arguments.history.exists(), format!("{shown} {why}"))?;
     }
@@ -123,7 +124,10 @@ fn append(arguments: &Arguments) -> Result<()> {
     // Each file has a machine and geometries of its own.
     let of_file = |file: &Input| {
         let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
-        Record::of_gate(&text, commit, repository).map_err(|why| Failure::about(file, why))
+        let record = Record::of_gate(&text, commit, repository);
+        let record = record.map_err(|why| Failure::about(file, why))?;
+        let why = format!("{} has no metric, so nothing is appended", file.display());
+        if record.metrics.is_empty() { Err(Failure::missing(why)) } else { Ok(record) }
     };
     let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
     if records.is_empty() {
@@ -134,11 +138,6 @@ fn append(arguments: &Arguments) -> Result<()> {
     for (name, value) in &arguments.value {
         let before = records.last_mut().expect("a record").metrics.insert(name.clone(), *value);
         Failure::unless(before.is_none(), format!("{name} has two values: give one of them"))?;
-    }
-    records.retain(|record| !record.metrics.is_empty());
-    if records.is_empty() {
-        let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
-        return Err(Failure::missing(why));
     }
     // It would make the history unreadable.
     records.iter().try_for_each(Record::check).map_err(Failure::input)?;
