@@ -8,7 +8,7 @@
 const COVERAGE: f64 = 0.95;
 
 /// A median with its confidence interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Median {
     /// Middle value, or the mean of the two middle values.
     pub value: f64,

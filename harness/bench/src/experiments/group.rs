@@ -78,10 +78,10 @@ impl Group {
         median(&self.runs.iter().map(value).collect::<Option<Vec<f64>>>()?)
     }
 
-    /// Returns the median of peak memory per cell, in bytes.
-    pub fn bytes_per_cell(&self) -> Median {
-        let bytes = self.median_of(|r| Some(r.peak_rss_bytes.sum / r.cells.max(1) as f64));
-        bytes.expect("a group has runs")
+    /// Returns the median of peak memory per cell, in bytes; `None` if it is unknown in a run.
+    pub fn bytes_per_cell(&self) -> Option<Median> {
+        let peak = |run: &Run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0);
+        self.median_of(|run| Some(peak(run)? / run.cells.max(1) as f64))
     }
 
     /// Returns the load imbalance of useful time, max / mean. The interval of the repetitions is extended to that of the typical run.
