@@ -251,7 +251,7 @@ fn impossible_numbers_of_a_line_are_noticed() {
         line_of(run).is_possible()
     };
     assert!(is_possible(|_| ()));
-    let faults: [fn(&mut Run); 15] = [
+    let faults: [fn(&mut Run); 17] = [
         |run| run.phases[0].messages.sum = -1e6,
         |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
         |run| run.peak_rss_bytes.sum = 1.0,
@@ -280,6 +280,9 @@ fn impossible_numbers_of_a_line_are_noticed() {
     assert!(!line(Entry::Network(network)).is_possible());
 }
 
+        // Less than the mean; more than both phases on their slowest ranks.
+        |run| run.useful_s = Spread { sum: 3.0, max: 0.1, ..Spread::default() },
+        |run| run.useful_s = Spread::of(&[0.0, 3.0]),
 #[test]
 fn repetitions_form_a_group_without_warm_ups() {
     let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
