@@ -272,7 +272,7 @@ impl Groups {
             let is_base = o.ranks == 1 || (weak || alike) && o.division() == s.division();
             // A projected time has a projected base, and a measured one a measured.
             let [mesh, other] =
-                [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
+                [s, o].map(|s| (case_of(s), s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
             same_size && is_base && mesh == other
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
@@ -365,7 +365,7 @@ pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Opt
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
     let lacks = |of: &str| lacks.get(engine).is_some_and(|all| all.iter().any(|what| what == of));
-    let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
+    let mut mesh = format!("{} {} {:e} {}", s.engine, case_of(s), s.spacing_min, s.layer_cells_min);
     if lacks(EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
@@ -424,8 +424,8 @@ fn apart(
         setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
     }
     if let Some(digest) = &run.geometry {
-        let Setup { case, spacing_min, layer_cells_min: n, .. } = &setup;
-        let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
+        let Setup { spacing_min, layer_cells_min: n, .. } = &setup;
+        let mesh = format!("{} at spacing {spacing_min:e}, n {n}", case_of(&setup));
         setup.case += &cases.suffix(&mesh, digest);
     }
     setup

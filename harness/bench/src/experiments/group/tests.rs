@@ -145,6 +145,18 @@ fn a_program_without_any_run_on_a_case_is_named() {
 
 /// A later session without runs, or with another network, changes nothing of an earlier one.
 #[test]
+fn a_mesh_of_targets_that_has_the_name_of_a_case_is_another_mesh() {
+    let of = |experiment: &str, ranks: usize, facets: u64| {
+        let mut run = run(Comm::Sim, 9, &[("a", &vec![1.0; ranks])]);
+        (run.setup.experiment, run.facets) = (experiment.into(), facets);
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(TARGETS, 1, 80), of("strong", 2, 12)]);
+    assert_eq!((groups.all.len(), groups.notes.len()), (2, 0), "{:?}", groups.notes);
+    assert_eq!(groups.reference(&groups.all[1]).setup.ranks, 2);
+}
+
+#[test]
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
     let network = |latency_s: f64, measured: bool| {
