@@ -85,7 +85,18 @@ fn a_run_without_a_result_is_of_the_machine_and_the_case_of_its_session() {
     assert_eq!(names, [("mesher", "cube"), ("mesher", "cube"), second, ("mesher [2]", "cube")]);
     assert_eq!(groups.efficiency(&groups.all[2]).global(), 1.0);
     let [missing] = &groups.missing[..] else { panic!("{:?}", groups.missing) };
-    assert!(missing.starts_with("no run of mesher [2] cube [2] strong"), "{missing}");
+    assert!(missing.starts_with("a run is missing, mesher [2] cube [2] strong"), "{missing}");
+}
+
+#[test]
+fn a_repetition_that_fails_is_named_unless_the_run_is_repeated_later() {
+    let ran = || line_of(run(Comm::Mpi, 9, &[("a", &[1.0])]));
+    let setup = ran().run().unwrap().setup.clone();
+    let failed = line(Entry::Failure(NoResult { setup, why: "killed".into() }));
+    let missing = |lines: &[Line]| Groups::of(lines).missing;
+    let [why] = &missing(&[ran(), failed.clone()])[..] else { panic!("a run is missing") };
+    assert!(why.starts_with("a run is missing, mesher cube strong") && why.ends_with(": killed"));
+    assert_eq!(missing(&[ran(), failed, ran()]), [""; 0]);
 }
 
 /// The names of nodes are new in every session of a cloud, so they do not make series.
@@ -134,17 +145,6 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
 }
 
 #[test]
-fn a_program_without_any_run_on_a_case_is_named() {
-    let (why, of) = ("keep = outside".to_owned(), run(Comm::Mpi, 1, &[("a", &[1.0])]));
-    let setup = Setup { engine: "other".into(), ..of.setup.clone() };
-    let left = |setup: &Setup| NoResult { setup: setup.clone(), why: why.clone() };
-    let lines = [&setup, &setup, &of.setup].map(|s| line(Entry::LeftOut(left(s))));
-    let groups = Groups::of(&[&lines[..], &[line_of(of)]].concat());
-    assert_eq!(groups.notes, ["other has no run on cube: keep = outside"]);
-}
-
-/// A later session without runs, or with another network, changes nothing of an earlier one.
-#[test]
 fn a_mesh_of_targets_that_has_the_name_of_a_case_is_another_mesh() {
     let of = |experiment: &str, ranks: usize, facets: u64| {
         let mut run = run(Comm::Sim, 9, &[("a", &vec![1.0; ranks])]);
@@ -156,6 +156,17 @@ fn a_mesh_of_targets_that_has_the_name_of_a_case_is_another_mesh() {
     assert_eq!(groups.reference(&groups.all[1]).setup.ranks, 2);
 }
 
+#[test]
+fn a_program_without_any_run_on_a_case_is_named() {
+    let (why, of) = ("keep = outside".to_owned(), run(Comm::Mpi, 1, &[("a", &[1.0])]));
+    let setup = Setup { engine: "other".into(), ..of.setup.clone() };
+    let left = |setup: &Setup| NoResult { setup: setup.clone(), why: why.clone() };
+    let lines = [&setup, &setup, &of.setup].map(|s| line(Entry::LeftOut(left(s))));
+    let groups = Groups::of(&[&lines[..], &[line_of(of)]].concat());
+    assert_eq!(groups.notes, ["other has no run on cube: keep = outside"]);
+}
+
+/// A later session without runs, or with another network, changes nothing of an earlier one.
 #[test]
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
@@ -269,6 +280,9 @@ fn impossible_numbers_of_a_line_are_noticed() {
         |run| run.peak_rss_bytes.sum = 1.0,
         |run| run.time_launch_s = -1.0,
         |run| run.useful_s.max *= 100.0,
+        // Less than the mean; more than both phases on their slowest ranks.
+        |run| run.useful_s = Spread { sum: 3.0, max: 0.1, ..Spread::default() },
+        |run| run.useful_s = Spread::of(&[0.0, 3.0]),
         |run| run.phases[0].useful_s = Spread::of(&[0.0, 0.0]),
         |run| run.time_wall_s = 0.0,
         |run| run.time_wall_s = 1e308,
@@ -292,9 +306,6 @@ fn impossible_numbers_of_a_line_are_noticed() {
     assert!(!line(Entry::Network(network)).is_possible());
 }
 
-        // Less than the mean; more than both phases on their slowest ranks.
-        |run| run.useful_s = Spread { sum: 3.0, max: 0.1, ..Spread::default() },
-        |run| run.useful_s = Spread::of(&[0.0, 3.0]),
 #[test]
 fn repetitions_form_a_group_without_warm_ups() {
     let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
