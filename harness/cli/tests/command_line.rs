@@ -139,6 +139,8 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["bench", "--network", "2e-6,10GB,1e10"], "as in 2e-6,1e10"),
         (&["bench", "--network", "2e-6,inf"], "as in 2e-6,1e10"),
         (&["bench", "--show", "--network", "1e-6,1e9"], "cannot be used with"),
+        (&["bench", "--show", "--timeout", "9"], "cannot be used with"),
+        (&["bench", "--show", "--mesher", file], "cannot be used with"),
         (&["shrink", file, "--test-only", "--out", "x"], "cannot be used with"),
         (&["why", place.path().to_str().unwrap(), "0,0,0", "--engine", "x"], "is meshed already"),
         (&["why", place.path().to_str().unwrap(), "0,0,0", "--mesher", file], "is meshed already"),
