@@ -51,14 +51,17 @@ pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
     let bytes = fs::read(path)?;
     let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
     let mut length = bytes.len() as u64;
+    let is_line = |line: &[u8]| serde_json::from_slice::<IgnoredAny>(line).is_ok();
+    // One value in many lines begins with a brace, too.
+    let first = bytes.split_inclusive(|byte| *byte == b'\n').next().unwrap_or(b"{");
+    let is_ours = first.starts_with(b"{") && (!first.ends_with(b"\n") || is_line(first));
     // A crash may leave zeros where the last line was to be.
-    let is_ours = bytes.is_empty() || bytes[0] == b'{';
     if !is_ours || !matches!(last.first(), None | Some(b'{' | 0)) {
         let why =
             "it does not consist of JSON lines, so nothing is appended to it: give another file";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
-    if serde_json::from_slice::<IgnoredAny>(last).is_ok() {
+    if is_line(last) {
         text.insert(0, '\n');
     } else if !last.is_empty() {
         length -= last.len() as u64;
@@ -78,7 +81,9 @@ mod tests {
     fn a_file_of_something_else_stays_as_it_is() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("file");
-        for content in ["solid a\nendsolid", "key = 1\n", "\0\0\n\0", "{}\n[a]\nnote", "a"] {
+        for content in
+            ["solid a\nendsolid", "key = 1\n", "\0\0\n\0", "{}\n[a]\nnote", "a", "{\n\"a\": 1\n}\n"]
+        {
             fs::write(&path, content).unwrap();
             let error = append(&path, &1).unwrap_err().to_string();
             assert!(error.contains("does not consist of JSON lines"), "{error}");

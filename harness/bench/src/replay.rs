@@ -243,7 +243,7 @@ fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
     let base = groups.reference(group);
     let scales = base.setup.ranks < group.setup.ranks;
     let ratios = [
-        ("bytes per cell", Some(group.bytes_per_cell())),
+        ("bytes per cell", group.bytes_per_cell()),
         ("load imbalance", (group.setup.ranks > 1).then(|| group.imbalance())),
         ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
         ("efficiency", scales.then(|| groups.global_efficiency(group))),

@@ -102,7 +102,7 @@ fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
 
 /// A step per line.
 pub fn summary(all: &[Series]) -> String {
-    let line = |series: &Series, change: &Change| {
+    let line = |(series, change): (&Series, &Change)| {
         let [before, after, by] = values(series, change);
         let accepted = if change.accepted { ", accepted" } else { "" };
         let sign = sign(series, change).map_or(String::new(), |sign| format!(", {sign}"));
@@ -113,8 +113,7 @@ pub fn summary(all: &[Series]) -> String {
             change.step.p
         )
     };
-    let text: String =
-        steps(all).into_iter().map(|(series, change)| line(series, change)).collect();
+    let text: String = steps(all).into_iter().map(line).collect();
     if text.is_empty() { "no change points\n".to_owned() } else { text }
 }
 
@@ -143,13 +142,11 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
     let x = |at: usize| series.points[at].0 as f64;
     let (low, high) = range(series);
     let mark = |change: &Change| {
-        let (name, style) =
-            match (series.is_worse(change.step.before, change.step.after), change.accepted) {
-                (None, _) => ("change", 3),
-                (Some(_), true) => ("accepted", 3),
-                (Some(true), false) => ("worse", 1),
-                (Some(false), false) => ("better", 2),
-            };
+        let (name, style) = match sign(series, change) {
+            None => ("change", 3),
+            Some(_) if change.accepted => ("accepted", 3),
+            Some(sign) => (sign, if sign == "worse" { 1 } else { 2 }),
+        };
         // Between the last commit with the old value and the first with the new one.
         let at = change.step.at;
         Plotted::vertical(name, style, x(at - 1).midpoint(x(at)), (low, high))

@@ -76,14 +76,14 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         trimmed_mean(differences.iter().map(|_| differences[random.below(differences.len())]))
     }));
     let floor = quantile(&null_effects, 1.0 - alpha);
-    let relative = |logarithm: f64| logarithm.exp_m1();
+    // Of logarithms.
     Comparison {
-        effect: relative(effect),
+        effect: effect.exp_m1(),
         p: (1 + as_large) as f64 / (1 + drawn) as f64,
-        floor: relative(floor),
-        visible: relative(floor + NORMAL_QUANTILE_95 * deviation(&bootstrap_effects)),
-        low: relative(quantile(&bootstrap_effects, 0.005)),
-        high: relative(quantile(&bootstrap_effects, 0.995)),
+        floor: floor.exp_m1(),
+        visible: (floor + NORMAL_QUANTILE_95 * deviation(&bootstrap_effects)).exp_m1(),
+        low: quantile(&bootstrap_effects, 0.005).exp_m1(),
+        high: quantile(&bootstrap_effects, 0.995).exp_m1(),
     }
 }
 

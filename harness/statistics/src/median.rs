@@ -8,7 +8,7 @@
 const COVERAGE: f64 = 0.95;
 
 /// A median with its confidence interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Median {
     /// Middle value, or the mean of the two middle values.
     pub value: f64,
@@ -68,11 +68,11 @@ fn middle(sorted: &[f64]) -> f64 {
 
 /// Returns the probability that the true median lies between the order statistics `cut` places from either end.
 fn coverage(n: usize, cut: usize) -> f64 {
-    let mut term = 0.5f64.powi(n as i32);
-    let mut below = 0.0;
+    // By its logarithm: of more than a thousand values, the first term is smaller than any number.
+    let (mut log2, mut below) = (-(n as f64), 0.0);
     for k in 0..=cut {
-        below += term;
-        term *= (n - k) as f64 / (k + 1) as f64;
+        below += log2.exp2();
+        log2 += ((n - k) as f64 / (k + 1) as f64).log2();
     }
     (1.0 - 2.0 * below).max(0.0)
 }
@@ -107,6 +107,17 @@ mod tests {
         assert_eq!(median(&[4.0, 2.0]).unwrap().value, 3.0);
         assert!(median(&[]).is_none());
         assert_eq!((median_of(&[3.0, 1.0, 2.0]), median_of(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
+    }
+
+    #[test]
+    fn the_interval_of_many_values_has_a_width() {
+        for n in [1000, 1074, 1075, 3000] {
+            let values: Vec<f64> = (1..=n).map(f64::from).collect();
+            let m = median(&values).unwrap();
+            // Of the normal distribution with the standard deviation sqrt(n) / 2.
+            let off = (m.high - m.low) / f64::from(n).sqrt() / 1.96;
+            assert!((off - 1.0).abs() < 0.05 && (0.95..0.96).contains(&m.coverage), "{n}: {m:?}");
+        }
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Base {
         let (mut name, mut stem) = (case.name.clone(), case.name.clone());
         if let Some([facets, ranks]) = per_rank {
             let all = facets * ranks;
-            (name, stem) = (grown(&name, facets), format!("{name}-{all}"));
+            (name, stem) = (grown(&name, facets), format!("{name}-{all}-facets"));
             let mut of_file: Table = read_toml(path)?;
             let generator = of_file.get_mut("generator").and_then(Value::as_table_mut);
             let generator = generator.ok_or_else(|| {
@@ -241,8 +241,17 @@ mod tests {
             [&small, &large].map(|base| Case::read(&base.write(0.1, 4, false).unwrap()).unwrap());
         assert_eq!(made.map(|case| case.facets.len()), [80, 320]);
         let given = place.path().join("given.toml");
-        fs::write(&given, "spacing_min = 0.1\ngeometry = \"ball-80.stl\"\n").unwrap();
+        fs::write(&given, "spacing_min = 0.1\ngeometry = \"ball-80-facets.stl\"\n").unwrap();
         let refused = Base::read(&given, Some([80, 1]), place.path()).unwrap_err();
+        // A case that is called like one of grown facets keeps its geometry.
+        let files = place.path().join("files");
+        fs::create_dir(&files).unwrap();
+        let other = place.path().join("ball-320.toml");
+        fs::write(&other, text.replace("sphere", "cube")).unwrap();
+        Base::read(&other, None, &files).unwrap();
+        let stl = fs::read(files.join("ball-320.stl")).unwrap();
+        Base::read(&path, Some([80, 4]), &files).unwrap();
+        assert!(fs::read(files.join("ball-320.stl")).unwrap() == stl);
         assert!(refused.why.ends_with("facets cannot grow without a [generator]"), "{refused:?}");
     }
 

@@ -377,7 +377,7 @@ pub struct Run {
 impl Run {
     /// Whether it has ranks, at most a million, of which all values are stored, or none; a wall time, which is at most that of the launcher
     /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and
-    /// sums that are those of the ranks and of the phases.
+    /// sums that are those of the ranks and of the phases, of which the slowest rank takes no longer than all phases on theirs.
     pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
@@ -389,16 +389,20 @@ impl Run {
         let is_of_all = |of: &Spread| of.by_rank.is_empty() || of.by_rank.len() == setup.ranks;
         let is_by_rank = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
+        let equal = setup.ranks as f64 * useful_s.max;
         let off = rounding(setup.ranks * phases.len(), total);
         let slowest = phases.iter().map(|phase| phase.wall_s.max).fold(0.0, f64::max);
-        let useful = phases.iter().map(|phase| phase.useful_s.max).reduce(f64::max);
+        let path = phases.iter().map(|phase| phase.useful_s.max).reduce(|a, b| a + b);
+        let path = path.unwrap_or(useful_s.max);
         (1..=1_000_000).contains(&setup.ranks)
-            && (setup.comm != Comm::Sim || useful.unwrap_or(useful_s.max) > 0.0)
+            && (setup.comm != Comm::Sim || path > 0.0)
             && *time_wall_s > 0.0
             && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
             && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)
             && are_times(times.chain(of_run))
             && spreads.all(|of| of.is_possible() && is_of_all(of))
+            && useful_s.sum <= equal + rounding(setup.ranks, equal)
+            && useful_s.max <= path + rounding(phases.len(), path)
             && (phases.is_empty() || !is_by_rank || (useful_s.sum - total).abs() <= off)
     }
 }

@@ -43,7 +43,6 @@ impl Runner<'_> {
     pub fn run(&self, setup: &Setup, case: &Path, repeat: Option<usize>) -> Result<Run> {
         let engine = self.programs.named(&setup.engine).with_launcher(self.launcher.clone());
         let written = repeat.is_none() && !is_own(engine.name());
-        let checked = written && !engine.description.promises.definition;
         let mesh = self.place.join("mesh");
         let options = RunOptions {
             // Its digest need not be in the run report.
@@ -51,7 +50,7 @@ impl Runner<'_> {
             ..RunOptions::new(self.place, self.limit)
         };
         let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);
-        let is_checked = checked && completed.is_ok();
+        let is_checked = written && !engine.description.promises.definition && completed.is_ok();
         let kept = is_checked.then(|| keeps_promises(&engine, case, &mesh)).transpose();
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);

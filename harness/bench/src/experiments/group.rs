@@ -19,7 +19,7 @@ use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
 use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median, median_of};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.
 pub struct Group {
@@ -78,10 +78,10 @@ impl Group {
         median(&self.runs.iter().map(value).collect::<Option<Vec<f64>>>()?)
     }
 
-    /// Returns the median of peak memory per cell, in bytes.
-    pub fn bytes_per_cell(&self) -> Median {
-        let bytes = self.median_of(|r| Some(r.peak_rss_bytes.sum / r.cells.max(1) as f64));
-        bytes.expect("a group has runs")
+    /// Returns the median of peak memory per cell, in bytes; `None` if it is unknown in a run.
+    pub fn bytes_per_cell(&self) -> Option<Median> {
+        let peak = |run: &Run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0);
+        self.median_of(|run| Some(peak(run)? / run.cells.max(1) as f64))
     }
 
     /// Returns the load imbalance of useful time, max / mean. The interval of the repetitions is extended to that of the typical run.
@@ -186,10 +186,10 @@ impl Groups {
                     lacks.extend(session.lacks.clone());
                     sessions.insert(&line.session, session);
                 }
-                Entry::LeftOut(left) => left_out.push((&line.session, left.clone())),
+                Entry::LeftOut(left) => left_out.push((named.len(), &line.session, left.clone())),
                 Entry::Failure(NoResult { setup, why }) => {
-                    let why = format!("{} failed: {why}", setup.engine);
-                    left_out.push((&line.session, NoResult { setup: setup.clone(), why }));
+                    let (setup, why) = (setup.clone(), format!("{} failed: {why}", setup.engine));
+                    left_out.push((named.len(), &line.session, NoResult { setup, why }));
                 }
                 Entry::Run(as_recorded) => {
                     let setup = apart(as_recorded, session, network, &mut origins);
@@ -203,7 +203,7 @@ impl Groups {
                         Some(why) => {
                             notes.push(format!("a run is left out, {}: {why}", run.setup));
                             let setup = as_recorded.setup.clone();
-                            left_out.push((&line.session, NoResult { setup, why }));
+                            left_out.push((0, &line.session, NoResult { setup, why }));
                         }
                     }
                 }
@@ -213,25 +213,26 @@ impl Groups {
         let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
         let all: Vec<Group> =
             by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
-        let of_all = |s: &Setup| (s.engine.clone(), s.case.clone());
-        let has_runs: HashSet<_> = all.iter().map(|group| of_all(&group.setup)).collect();
-        let as_named = |(session, NoResult { setup, why }): (&String, NoResult)| {
+        let is_of = |g: &Group, s: &Setup| (&g.setup.engine, &g.setup.case) == (&s.engine, &s.case);
+        let as_named = |(at, session, NoResult { setup, why }): (usize, &String, NoResult)| {
             let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {
                 let last = named.iter().rfind(|(of, ran, _)| of == session && is_same(ran));
                 last.map_or(&setup, |(.., named)| named)
             };
             let engine = of_runs(&|ran| ran.engine == setup.engine).engine.clone();
             let case = of_runs(&|ran| case_of(ran) == case_of(&setup)).case.clone();
-            NoResult { setup: Setup { engine, case, ..setup }, why }
+            (at, Setup { engine, case, ..setup }, why)
         };
-        let left_out = left_out.into_iter().map(as_named);
-        let without = left_out.filter(|left| all.iter().all(|g| g.setup != left.setup));
-        notes.extend(without.map(
-            |NoResult { setup, why }| match has_runs.contains(&of_all(&setup)) {
-                true => format!("no run of {setup}: {why}"),
-                false => format!("{} has no run on {}: {why}", setup.engine, setup.case),
-            },
-        ));
+        // Without any run, or with no run after it: further repetitions are missing.
+        let is_missing = |(at, setup, _): &(usize, Setup, String)| {
+            let has_later = named[*at..].iter().any(|(.., later)| later == setup);
+            !has_later || all.iter().all(|group| group.setup != *setup)
+        };
+        let missing = left_out.into_iter().map(as_named).filter(is_missing);
+        notes.extend(missing.map(|(_, setup, why)| match all.iter().any(|g| is_of(g, &setup)) {
+            true => format!("a run is missing, {setup}: {why}"),
+            false => format!("{} has no run on {}: {why}", setup.engine, setup.case),
+        }));
         let origins = origins.each_ref().map(Origins::described).concat();
         let missing = distinct(notes);
         let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(missing.clone()).collect();
@@ -272,7 +273,7 @@ impl Groups {
             let is_base = o.ranks == 1 || (weak || alike) && o.division() == s.division();
             // A projected time has a projected base, and a measured one a measured.
             let [mesh, other] =
-                [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
+                [s, o].map(|s| (case_of(s), s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
             same_size && is_base && mesh == other
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
@@ -365,7 +366,7 @@ pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Opt
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
     let lacks = |of: &str| lacks.get(engine).is_some_and(|all| all.iter().any(|what| what == of));
-    let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
+    let mut mesh = format!("{} {} {:e} {}", s.engine, case_of(s), s.spacing_min, s.layer_cells_min);
     if lacks(EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
@@ -424,8 +425,8 @@ fn apart(
         setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
     }
     if let Some(digest) = &run.geometry {
-        let Setup { case, spacing_min, layer_cells_min: n, .. } = &setup;
-        let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
+        let Setup { spacing_min, layer_cells_min: n, .. } = &setup;
+        let mesh = format!("{} at spacing {spacing_min:e}, n {n}", case_of(&setup));
         setup.case += &cases.suffix(&mesh, digest);
     }
     setup

@@ -60,7 +60,7 @@ pub struct GateOptions {
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
     pub timeout: Duration,
-    /// Time for one case in the layer of time [default: from the rules]
+    /// Time for one case in the layer of time, serially and on each number of ranks [default: from the rules]
     #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
     pub budget: Option<Duration>,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
@@ -111,10 +111,9 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
 
 fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
     // Without a choice of layers, those are requested for which the rules have a case.
-    let requested = |name: &LayerName| match bench.options.layers.is_empty() {
-        true => bench.asked(*name).next().is_some(),
-        false => bench.options.layers.contains(name),
-    };
+    let given = &bench.options.layers;
+    let is_asked = |name: &LayerName| given.is_empty() && bench.asked(*name).next().is_some();
+    let requested = |name: &LayerName| given.contains(name) || is_asked(name);
     for name in LayerName::value_variants().iter().copied().filter(requested) {
         if interrupt::requested() {
             break;

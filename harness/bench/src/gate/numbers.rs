@@ -170,7 +170,7 @@ fn verdict(layer: LayerName, metric: &str, values: [u64; 2], tolerance: f64) -> 
     match () {
         () if old == new => (Verdict::Unchanged, String::new()),
         // The size of the mesh is a result, not a cost: a change is neither better nor worse.
-        () if metric == CELLS || metric.ends_with(LEAVES) => {
+        () if matches!(metric.rsplit('/').next(), Some(CELLS | LEAVES)) => {
             (Verdict::Changed, "another number of leaves".to_owned())
         }
         () if is_within && layer == LayerName::Counters => {
@@ -345,6 +345,10 @@ mod tests {
         assert_eq!(of([100, 99], 0.0), Verdict::Improvement);
         assert_eq!(of([0, 0], 0.0), Verdict::Unchanged);
         assert_eq!(of([0, 1], 50.0), Verdict::Regression);
+        // Of leaves, their number is no cost; what is done to them is one.
+        let of = |name| verdict(LayerName::Counters, name, [100, 200], 0.0).0;
+        assert_eq!(["4 ranks/leaves", "cells"].map(of), [Verdict::Changed; 2]);
+        assert_eq!(of("4 ranks/visited_leaves"), Verdict::Regression);
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub struct TimeRules {
     pub rounds_min: usize,
     /// Maximum number of rounds.
     pub rounds_max: usize,
-    /// Time for one case, in seconds; what looks like a change is measured twice.
+    /// Time for one case, serially and on each number of ranks, in seconds; what looks like a change is measured twice.
     pub budget_s: f64,
     /// Greatest rate of false discoveries among all quantities of all cases; the probability of a false alarm per run.
     pub alpha: f64,

@@ -188,6 +188,7 @@ fn place_in_source(error: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::failure::EXIT_MISSING;
 
     #[test]
     fn a_panic_elsewhere_is_another_failure() {
@@ -199,5 +200,7 @@ mod tests {
         assert!(first.is_same_as(&failed("m: panicked at src/tree.rs:12:40: | 9 points")));
         assert!(!first.is_same_as(&failed("m: panicked at src/tools.rs:12:40: | 7 points")));
         assert!(failed("error: 7 points").is_same_as(&failed("error: 9 points at 12:30")));
+        let missing = Ended::new("m", End::Missing("cannot be started".to_owned()));
+        assert_eq!(failed_run(missing, Ranks::Mpi(2)).unwrap_err().code, EXIT_MISSING);
     }
 }

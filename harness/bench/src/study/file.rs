@@ -267,6 +267,7 @@ impl Study {
             refuse(&[
                 (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
                 (!cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
+                (spacing_min.is_some_and(|s| !s.is_normal() || s < 0.0), "spacing_min is positive"),
             ])
             .map_err(|why| format!("mesh {name}: {why}"))?;
         }
@@ -394,7 +395,7 @@ impl Series {
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
             (
-                what == Spacing && !self.cells.iter().any(|n| *n >= 4e5),
+                what == Spacing && (self.cells.is_empty() || self.cells.iter().any(|n| *n < 4e5)),
                 "give cells of 4e5 or more, for two spacings",
             ),
             (what == Weak && self.cells.is_empty(), "give the cells of a rank"),

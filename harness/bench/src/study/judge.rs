@@ -162,10 +162,8 @@ impl Judged {
         let words = if self.is_bad() { words.to_uppercase() } else { words };
         let why = if self.why.is_empty() { "" } else { ": " };
         let target = if target.is_empty() { "-".to_owned() } else { target };
-        let (value, how) = match self.measured {
-            Some((value, how)) => (measure.show(value), how),
-            None => ("-".to_owned(), "-"),
-        };
+        let measured = self.measured.map(|(value, how)| (measure.show(value), how));
+        let (value, how) = measured.unwrap_or(("-".to_owned(), "-"));
         [name.clone(), target, value, how.to_owned(), format!("{words}{why}{}", self.why)]
     }
 }

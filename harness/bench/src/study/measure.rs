@@ -81,9 +81,7 @@ pub static MEASURES: [Measure; 15] = [
     }),
     measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rates().value / s.against.rates().value)),
     measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| peak(s.run())),
-    measure("bytes_per_cell", Alone, PER_CELL, |s| {
-        peak(s.run()).and(Ok(s.run().bytes_per_cell().value))
-    }),
+    measure("bytes_per_cell", Alone, PER_CELL, |s| reported(s.run().bytes_per_cell())),
     measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),
     measure("time_per_cell_growth", Series, PLAIN, |s| Ok(growth(s.runs))),
     measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run())),
@@ -129,8 +127,11 @@ pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure
 
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
 fn peak(run: &Group) -> Result<f64, String> {
-    let peak = run.median_of(|run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0));
-    peak.map(|median| median.value).ok_or("the program does not report its memory".to_owned())
+    reported(run.median_of(|run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0)))
+}
+
+fn reported(memory: Option<statistics::Median>) -> Result<f64, String> {
+    memory.map(|median| median.value).ok_or("the program does not report its memory".to_owned())
 }
 
 fn lambda_cells(run: &Group) -> Result<f64, String> {

@@ -194,10 +194,9 @@ impl Session<'_> {
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
-        match self.options.no_mpi {
-            true => Some("--no-mpi was given"),
-            false => (!self.options.launcher.is_found()).then_some(NO_LAUNCHER),
-        }
+        let SessionOptions { no_mpi, launcher, .. } = self.options;
+        let is_missing = !launcher.is_found();
+        if *no_mpi { Some("--no-mpi was given") } else { is_missing.then_some(NO_LAUNCHER) }
     }
 
     /// Plans the runs of a series at one size.
@@ -212,7 +211,10 @@ impl Session<'_> {
             let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
             if layouts.is_empty() {
-                let why = format!("{engine} cannot run the series {named}");
+                let is_able = !series.layouts(description, false).is_empty();
+                let why = self.mpi_left_out().filter(|_| is_able);
+                let why = why.unwrap_or("its engine file does not offer them");
+                let why = format!("{engine} cannot make the runs of the series {named}: {why}");
                 (self.progress)(&why);
                 let (experiment, engine) = (named.clone(), engine.clone());
                 let [weights, partitioner] = <[_; 2]>::from(series.choices()[0]).map(str::to_owned);
@@ -416,11 +418,9 @@ impl Session<'_> {
                 let why = "the mesh was not compared with that of the definition, because the mesher failed";
                 Failure { why: format!("{why}: {}", failure.why), ..failure }
             })?;
-            let (digest, of_definition) = (&run.digest, &expected.digest);
-            let why = format!(
-                "the mesh has digest {digest}, but that of the definition has {of_definition}"
-            );
-            Failure::unless(digest == of_definition, why)?;
+            let (here, there) = (&run.digest, &expected.digest);
+            let why = format!("the mesh has digest {here}, but that of the definition has {there}");
+            Failure::unless(here == there, why)?;
         }
         let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
         let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.meshes);

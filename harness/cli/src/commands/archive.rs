@@ -140,9 +140,9 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
     require_made(&study, &lines, &Paths::find())?;
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
-    // A network that was given is no property of a machine.
-    let given = lines.iter().filter_map(Line::network).filter(|(_, network)| !network.measured);
-    let network = session.network.or(given.map(|(_, network)| network).next_back());
+    // A network that was given is no property of a machine. The last one is that of the values.
+    let last = lines.iter().filter_map(Line::network).next_back().map(|(_, network)| network);
+    let network = session.network.or(last.filter(|network| !network.measured));
     let repeat = session.repeat.or(fitting);
     let session = SessionOptions { repeat, network, ..session.clone() };
     leave_out_missing(&mut study)?;
@@ -170,12 +170,13 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     Ok(if has_failed { EXIT_FAILED } else { code(&replayed) })
 }
 
-/// Removes the programs of others that are not installed here, and says so.
+/// Removes the programs of others that cannot be run here, and prints why.
 fn leave_out_missing(study: &mut Study) -> Result<()> {
     let paths = Paths::find();
     for name in study.engines().iter().filter(|name| !is_own(name)) {
-        if !Engine::find(name, None, &paths).is_ok_and(|engine| engine.require().is_ok()) {
-            eprintln!("harness: {name} is not installed here: its runs are left out");
+        let engine = Engine::find(name, None, &paths).map_err(Failure::from);
+        if let Err(Failure { why, .. }) = engine.and_then(|engine| engine.require()) {
+            eprintln!("harness: the runs of {name} are left out: {why}");
             study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
         }
     }

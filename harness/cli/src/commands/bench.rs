@@ -35,7 +35,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME|FILE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Print the tables of an existing record without measuring
-    #[arg(long, conflicts_with_all = ["engine", "repeat", "network", "no_mpi", "launcher"])]
+    #[arg(long, conflicts_with_all = ["engine", "repeat", "network", "no_mpi", "launcher", "timeout", "mesher", "reference"])]
     show: bool,
     #[command(flatten)]
     session: SessionOptions,
@@ -235,7 +235,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let without = left_out.find(|of| !runs.contains(of));
     let has_series = !study.series.is_empty();
     let why = match without {
-        _ if !has_series && rows.iter().all(|row| row.measured.is_none()) => "no row was measured",
+        _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
         _ if has_series && runs.is_empty() => {
             "nothing was measured of the study: request fewer cells, or name another record"
         }
@@ -278,6 +278,11 @@ mod tests {
         }
         assert_eq!(code(&study, &[], &[&all[..], &[weak]].concat()), EXIT_MISSING);
         assert_eq!(code(&study, &[], &[&all[..], &[of_row]].concat()), EXIT_HOLDS);
+        // Nor do series make up for rows of which none has a value.
+        let rows = "[mesh.a]\ncase = 'cube'\n[run.a]\nmesh = 'a'\n[[row]]\nname = 'r'\nrun = 'a'\nmeasure = 'seconds'\n";
+        let both = read(&format!("{series}{rows}")).unwrap();
+        let left = unjudged(&both.row[0], false, "no launcher".into());
+        assert_eq!(code(&both, &[left], &all), EXIT_MISSING);
     }
 
     #[test]

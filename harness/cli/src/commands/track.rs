@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Exit code 1 (and a failed test) if the last change of a metric is for the worse and within its last N values
+    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
@@ -124,7 +124,10 @@ fn append(arguments: &Arguments) -> Result<()> {
     // Each file has a machine and geometries of its own.
     let of_file = |file: &Input| {
         let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
-        Record::of_gate(&text, commit, repository).map_err(|why| Failure::about(file, why))
+        let record = Record::of_gate(&text, commit, repository);
+        let record = record.map_err(|why| Failure::about(file, why))?;
+        let why = format!("{} has no metric, so nothing is appended", file.display());
+        if record.metrics.is_empty() { Err(Failure::missing(why)) } else { Ok(record) }
     };
     let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
     if records.is_empty() {
@@ -135,11 +138,6 @@ fn append(arguments: &Arguments) -> Result<()> {
     for (name, value) in &arguments.value {
         let before = records.last_mut().expect("a record").metrics.insert(name.clone(), *value);
         Failure::unless(before.is_none(), format!("{name} has two values: give one of them"))?;
-    }
-    records.retain(|record| !record.metrics.is_empty());
-    if records.is_empty() {
-        let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
-        return Err(Failure::missing(why));
     }
     // It would make the history unreadable.
     records.iter().try_for_each(Record::check).map_err(Failure::input)?;

@@ -271,6 +271,19 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     fs::write(fixture.path("empty.jsonl"), "").unwrap();
     let nothing = fixture.harness("track empty.jsonl");
     assert_eq!(nothing.code, 3, "{}", nothing.printed);
+    // Nor is one to which a file of no numbers was to be added, with others or without.
+    let of = "{\"named\": \"m\", \"revision\": null, \"program\": \"\"}";
+    let record = format!(
+        "{{\"schema\": \"octree-measures/1\", \"of\": {of}, \"machine\": \"\", \"cases\": {{}}}}"
+    );
+    fixture.write("none.json", &record);
+    let history = fs::read_to_string(fixture.path("history.jsonl")).unwrap();
+    for more in ["", " --value case/words=1"] {
+        let nothing = fixture.harness(&format!("track history.jsonl --add none.json{more}"));
+        let why = "none.json has no metric, so nothing is appended";
+        assert!(nothing.code == 3 && nothing.printed.contains(why), "{}", nothing.printed);
+    }
+    assert_eq!(fs::read_to_string(fixture.path("history.jsonl")).unwrap(), history);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn scripted() -> Fixture {
 
 const TARGETS_COMMAND: &str = "targets targets.toml --mesher ./mesher --network 1e-6,1e10";
 /// The network is that of the record.
-const SHOW: &str = "targets targets.toml --mesher ./mesher --show";
+const SHOW: &str = "targets targets.toml --show";
 
 #[test]
 fn met_targets_succeed_and_the_record_gives_the_same_table() {
@@ -185,6 +185,66 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let nothing = replay();
     assert!(nothing.code == 1 && nothing.printed.contains("4 missing"), "{}", nothing.printed);
     assert!(nothing.printed.contains("mesher ended with code 70"), "{}", nothing.printed);
+}
+
+/// The record that ends last has them, whatever the names of the files.
+#[test]
+fn the_last_build_and_the_last_network_are_those_of_an_archive() {
+    let fixture = scripted();
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
+    fixture
+        .write("study.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [1]\n");
+    let bench = fixture.harness("bench study.toml --mesher ./mesher --report out");
+    assert_eq!(bench.code, 0, "{}", bench.printed);
+    // As if the network had been measured, after a session of another build and with a network that was given.
+    let record = fs::read_to_string(fixture.path("out/record.jsonl")).unwrap();
+    fixture.write("out/a.jsonl", &record.replace("\"measured\":false", "\"measured\":true"));
+    let older = record.lines().map(|line| {
+        let mut of: serde_json::Value = serde_json::from_str(line).unwrap();
+        (of["session"], of["time_utc"]) = ("old".into(), "2001-01-01T00:00:00Z".into());
+        match of["kind"].as_str() {
+            Some("run") => (of["digest"], of["program"]) = ("01".into(), "old".into()),
+            Some("network") => (of["latency_s"], of["given"]) = (0.25_f64.into(), true.into()),
+            _ => {}
+        }
+        format!("{of}\n")
+    });
+    fixture.write("out/record.jsonl", &older.collect::<String>());
+    let study = fs::read_to_string(fixture.path("study.toml")).unwrap();
+    fixture.write("study.toml", &format!("{study}engines = ['mesher', 'engine.toml']\n"));
+    let archive = fixture.harness("archive out study.toml -o a --title T --author A --licence MIT");
+    assert_eq!(archive.code, 0, "{}", archive.printed);
+    // What cannot be run here has its own reason.
+    fixture.write("a/study/engine.toml", "serial = 1");
+    let expected = fs::read_to_string(fixture.path("a/expected.json")).unwrap();
+    assert!(expected.contains("\"00\"") && !expected.contains("\"01\""), "{expected}");
+    let replay = fixture.harness("replay a --mesher ./mesher --record again.jsonl");
+    assert_eq!(replay.code, 0, "{}", replay.printed);
+    let left_out = "engine.toml are left out: ";
+    assert!(replay.printed.contains(left_out) && replay.printed.contains("unknown field"));
+    let again = fs::read_to_string(fixture.path("again.jsonl")).unwrap();
+    assert!(again.contains("\"latency_s\":") && !again.contains("\"latency_s\":0.25"), "{again}");
+}
+
+/// The report says why.
+#[test]
+fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
+    let fixture = scripted();
+    let series = "[[series]]\nexperiment = 'weak'\ncase = 'case.toml'\ncells = [1e3]\nmpi = [2]\n";
+    fixture.write("study.toml", series);
+    for report in ["", " --report out"] {
+        let bench = "bench study.toml --mesher ./mesher --no-mpi --record r.jsonl";
+        let outcome = fixture.harness(&format!("{bench}{report}"));
+        let why = "mesher cannot make the runs of the series weak: --no-mpi was given";
+        assert!(outcome.code == 3 && outcome.printed.contains(why), "{}", outcome.printed);
+    }
+    let page = fs::read_to_string(fixture.path("out/index.html")).unwrap();
+    assert!(page.contains("cannot make the runs of the series weak"), "{page}");
+    // Of a report alone, this is all that was asked for.
+    let alone = fixture.harness("report out --record r.jsonl");
+    let why = "no repetition succeeded; the page lists the reasons";
+    assert!(alone.code == 2 && alone.printed.contains(why), "{}", alone.printed);
 }
 
 /// Facets that grow with the ranks are those of one case, and an edit of its file makes another one.

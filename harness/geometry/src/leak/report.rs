@@ -178,11 +178,9 @@ impl fmt::Display for Report {
 fn describe(passage: &Passage, is_closed: bool, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let n = &passage.narrowest;
     let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
-    let (closing, end) = match n.is_end {
-        true => (String::new(), END),
-        false if is_closed => (format!("          Spacings above {max} {CLOSE}\n"), ""),
-        false => (String::new(), ""),
-    };
+    let (is_named, end) = (is_closed && !n.is_end, if n.is_end { END } else { "" });
+    let closing = format!("          Spacings above {max} {CLOSE}\n");
+    let closing = if is_named { &closing } else { "" };
     let listed: Vec<String> = n.facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
     let more = match n.facets.len().saturating_sub(FACETS_MAX) {
         0 => String::new(),

@@ -121,7 +121,9 @@ fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
     let figure = over_cells(subject, all, names, of_rates, Group::rates);
     let names = ["memory", "Peak memory per cell", "bytes per cell"];
     let of_memory = ["Peak resident memory of all ranks, program and facets included,", &at];
-    let memory = over_cells(subject, all, names, of_memory, Group::bytes_per_cell);
+    // One that is unknown is a value of 0, which the axis cannot show.
+    let bytes = |group: &Group| group.bytes_per_cell().unwrap_or_default();
+    let memory = over_cells(subject, all, names, of_memory, bytes);
     [with_paper(figure, subject, "", Some(rate)), memory]
 }
 

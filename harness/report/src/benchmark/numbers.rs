@@ -55,7 +55,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         ("time", Some(group.time_s), "s"),
         ("cpu", group.cpu_s(), "s"),
         ("rate", Some(group.rates()), "$10^6$ cells/s/rank"),
-        ("memory", Some(group.bytes_per_cell()), "B/cell"),
+        ("memory", group.bytes_per_cell(), "B/cell"),
         ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
         ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];

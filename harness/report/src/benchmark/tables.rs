@@ -80,11 +80,16 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("global\nefficiency", &|(g, e)| of_base(g, e.global())),
             ("base case", &|(g, _)| groups.reference(g).how_on()),
             ("10⁶\ncells / s / rank", &|(g, _)| format!("{:.2}", g.rates().value)),
-            ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
+            ("bytes / cell", &|(g, _)| known(g.bytes_per_cell(), 2)),
         ],
     );
     let efficiencies: Vec<Efficiency> = of.iter().map(|(_, e)| *e).collect();
     Table { notes: above_one(&efficiencies).into_iter().collect(), ..table }
+}
+
+/// A median with so many decimals, if it is known.
+fn known(of: Option<statistics::Median>, decimals: usize) -> String {
+    of.map_or("unknown".to_owned(), |of| format!("{:.decimals$}", of.value))
 }
 
 /// Projected and measured times of the same meshes on equally many ranks.
@@ -145,8 +150,7 @@ fn phases(group: &Group) -> Table {
 /// Several programs on one core, and what the programs do not provide.
 fn programs(comparison: &Comparison) -> Table {
     let Setup { case, layer_cells_min, .. } = &comparison.groups[0].setup;
-    let known = |value: Option<f64>| value.map_or("unknown".to_owned(), |v| format!("{v:.3}"));
-    let cpu_s = |g: &Group| g.cpu_s().map(|time| time.value);
+    let rate = |g: &Group| Some(g.cpu_s()?.falling(|s| g.cells() as f64 / s / 1e6));
     let table = Table::of(
         format!("programs on one core: {case}, n = {layer_cells_min}"),
         &comparison.groups,
@@ -156,12 +160,12 @@ fn programs(comparison: &Comparison) -> Table {
                 _ => g.setup.engine.clone(),
             }),
             ("cells", &|g| grouped(g.cells())),
-            ("CPU\ntime / s", &|g| known(cpu_s(g))),
+            ("CPU\ntime / s", &|g| known(g.cpu_s(), 3)),
             ("of\nit\nsearch / s", &|g| {
                 g.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
             }),
-            ("10⁶\ncells / s / core", &|g| known(cpu_s(g).map(|s| g.cells() as f64 / s / 1e6))),
-            ("bytes / cell", &|g| format!("{:.1}", g.bytes_per_cell().value)),
+            ("10⁶\ncells / s / core", &|g| known(rate(g), 3)),
+            ("bytes / cell", &|g| known(g.bytes_per_cell(), 1)),
         ],
     );
     Table { notes: comparison.notes.clone(), ..table }
@@ -170,7 +174,8 @@ fn programs(comparison: &Comparison) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Entry, Line, NoResult, Session};
+    use crate::benchmark::numbers::{Number, numbers};
+    use bench::experiments::entry::{Entry, Line, NoResult, Session, Spread};
     use bench::testing::{line, run};
 
     #[test]
@@ -225,10 +230,13 @@ mod tests {
         assert!(text(&groups).contains("n=4 solo:1 metis area: slow would take 9 s"));
         assert!(Groups::of(&lines[..2]).comparisons().is_empty(), "one program is no comparison");
         let Entry::Run(mut slow) = lines[2].entry.clone() else { panic!("a run") };
-        slow.time_cpu_s = 1.0;
+        (slow.time_cpu_s, slow.peak_rss_bytes) = (1.0, Spread::brief(&[]));
         let groups = Groups::of(&[lines[1].clone(), line(Entry::Run(slow))]);
         let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
         let rows = programs(comparison).rows;
-        assert_eq!(rows[1].join(" "), "slow 1,000,000 unknown 0.50 unknown 1.0");
+        assert_eq!(rows[1].join(" "), "slow 1,000,000 unknown 0.50 unknown unknown");
+        assert!(text(&groups).contains("       unknown\n"), "{}", text(&groups));
+        let memory = |n: &&Number| n.key.starts_with("slow/") && n.key.ends_with("/memory");
+        assert_eq!(numbers(&groups).iter().find(memory), None);
     }
 }

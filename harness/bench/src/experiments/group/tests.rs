@@ -85,7 +85,18 @@ fn a_run_without_a_result_is_of_the_machine_and_the_case_of_its_session() {
     assert_eq!(names, [("mesher", "cube"), ("mesher", "cube"), second, ("mesher [2]", "cube")]);
     assert_eq!(groups.efficiency(&groups.all[2]).global(), 1.0);
     let [missing] = &groups.missing[..] else { panic!("{:?}", groups.missing) };
-    assert!(missing.starts_with("no run of mesher [2] cube [2] strong"), "{missing}");
+    assert!(missing.starts_with("a run is missing, mesher [2] cube [2] strong"), "{missing}");
+}
+
+#[test]
+fn a_repetition_that_fails_is_named_unless_the_run_is_repeated_later() {
+    let ran = || line_of(run(Comm::Mpi, 9, &[("a", &[1.0])]));
+    let setup = ran().run().unwrap().setup.clone();
+    let failed = line(Entry::Failure(NoResult { setup, why: "killed".into() }));
+    let missing = |lines: &[Line]| Groups::of(lines).missing;
+    let [why] = &missing(&[ran(), failed.clone()])[..] else { panic!("a run is missing") };
+    assert!(why.starts_with("a run is missing, mesher cube strong") && why.ends_with(": killed"));
+    assert_eq!(missing(&[ran(), failed, ran()]), [""; 0]);
 }
 
 /// The names of nodes are new in every session of a cloud, so they do not make series.
@@ -131,6 +142,18 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
     assert_eq!(with(|run| run.facets = 0, &[]), kept, "one that does not report them");
     assert_eq!(with(|run| run.cells = 18, &[EQUAL_RUNS]), kept);
     assert_eq!(with(|run| run.facets = 13, &[EQUAL_RUNS]), left_out);
+}
+
+#[test]
+fn a_mesh_of_targets_that_has_the_name_of_a_case_is_another_mesh() {
+    let of = |experiment: &str, ranks: usize, facets: u64| {
+        let mut run = run(Comm::Sim, 9, &[("a", &vec![1.0; ranks])]);
+        (run.setup.experiment, run.facets) = (experiment.into(), facets);
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(TARGETS, 1, 80), of("strong", 2, 12)]);
+    assert_eq!((groups.all.len(), groups.notes.len()), (2, 0), "{:?}", groups.notes);
+    assert_eq!(groups.reference(&groups.all[1]).setup.ranks, 2);
 }
 
 #[test]
@@ -251,12 +274,15 @@ fn impossible_numbers_of_a_line_are_noticed() {
         line_of(run).is_possible()
     };
     assert!(is_possible(|_| ()));
-    let faults: [fn(&mut Run); 15] = [
+    let faults: [fn(&mut Run); 17] = [
         |run| run.phases[0].messages.sum = -1e6,
         |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
         |run| run.peak_rss_bytes.sum = 1.0,
         |run| run.time_launch_s = -1.0,
         |run| run.useful_s.max *= 100.0,
+        // Less than the mean; more than both phases on their slowest ranks.
+        |run| run.useful_s = Spread { sum: 3.0, max: 0.1, ..Spread::default() },
+        |run| run.useful_s = Spread::of(&[0.0, 3.0]),
         |run| run.phases[0].useful_s = Spread::of(&[0.0, 0.0]),
         |run| run.time_wall_s = 0.0,
         |run| run.time_wall_s = 1e308,

@@ -124,6 +124,7 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
         ("mpi", "facets = 100000001\nmpi", "facets is from 1 to 1e8"),
         ("mpi = [1]", "", "give ranks"),
         ("'strong'", "'layers'", "give layers"),
+        ("weak'\ncase = 'cube'\ncells = [", "spacing'\ncase = 'cube'\ncells = [1e6, ", "of 4e5"),
         ("'strong'", "'luck'", "unknown variant"),
         ("sim", "repeats = 0\nsim", "repeats is at least 1"),
     ] {
@@ -144,6 +145,7 @@ fn contradictions_are_reported() {
         ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
         ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
         ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
+        ("spacing_min = 0.1", "spacing_min = 0.0", "mesh cube: spacing_min is positive"),
         ("case = \"cube-small\"", "", "missing field"),
         ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
         ("at_least", "atleast", "unknown field"),
