@@ -253,7 +253,7 @@ fn a_path_starts_at_the_first_seed_that_reaches_its_end() {
         "spacing_min = 0.0625\nseeds = [[2.5, 2.5, 2.5], [0.0, 0.0, 0.0]]\n[root]\norigin = {origin:?}\nedge = {edge:?}"
     );
     let case = Case::from_parts(&text, facets).unwrap();
-    let tree = |level| Ok(base_tree(&case.facets_lattice, level));
+    let tree = |level| Ok(base_tree(&case.facets_lattice, |_| level));
     let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
     for (end, seed) in
         [(Target::Far, 0.0), (Target::Point([0.0, 0.0, 3.0]), 0.0), (Target::Point([2.6; 3]), 2.5)]
