@@ -98,7 +98,7 @@ impl<'a> Space<'a> {
         Ok(Self { cells, order, facets, words, outside })
     }
 
-    /// The edge of the leaf that the nearest point of a facet is in: around a place in a box, one of the box.
+    /// The edge of the leaf that holds the point of the facets nearest to a place, at this distance: in a box, a leaf of the box.
     pub fn leaf_of_facet(&self, at: Point, distance: f64) -> f64 {
         let nearest = self.facets.triangle(self.facets.within(at, 1.05 * distance)[0]);
         let leaf = leaf_at(self.words, nearest.project_local_point(at, true).point);
