@@ -123,6 +123,24 @@ fn a_baseline_without_a_mesh_has_no_correctness_to_compare_with() {
     }
 }
 
+/// As one that is older than the option that makes ranks stay.
+#[test]
+fn correctness_on_ranks_needs_no_program_that_stays() {
+    let fixture = Fixture::new();
+    let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
+    fixture.write("case.toml", &case.replace("spacing_min = 1.0", "spacing_min = 8.0"));
+    let on_ranks = "parallel = [\"{program}\", \"{case}\", \"{ranks}\"]\nserve = [\"--serve\"]\n";
+    let promises = "[promises]\ncomplete = true\nindependent_of = [\"ranks\"]\n";
+    let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    fixture.write("engine.toml", &[&engine, on_ranks, promises].concat());
+    let rules = "[[case]]\nname = \"case.toml\"\nlayers = [\"correctness\"]\nmpi = [2]\n";
+    fixture.write("gate.toml", rules);
+    let outcome = fixture.harness(
+        "gate --engine engine.toml --rules gate.toml --baseline engine --candidate engine",
+    );
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+}
+
 #[test]
 fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     let fixture = Fixture::new();
