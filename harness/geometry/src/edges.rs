@@ -122,7 +122,7 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
         findings[at].add(first, || {
             let [p, q] = uses[0].ends.map(|v| edges.points[v as usize]);
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
-            Place::new(uses.iter().map(|u| u.facet).take(Place::FACETS_MAX).collect(), middle)
+            Place::new(uses.iter().map(|u| u.facet).collect(), middle)
         });
     }
     findings

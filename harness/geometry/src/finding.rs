@@ -48,6 +48,8 @@ pub enum Kind {
 pub struct Place {
     /// Facets by number, counting from 0, at most [`Place::FACETS_MAX`].
     pub facets: Vec<u32>,
+    /// Number of further facets.
+    pub facets_more: usize,
     /// A point nearby, in the user's units.
     pub at: [f64; 3],
     /// Openings: free width; thin walls and gaps: distance of the facets, which a twentieth of their area undercuts. In the user's units.
@@ -59,8 +61,10 @@ impl Place {
     pub const FACETS_MAX: usize = 8;
 
     /// A place without sizes.
-    pub fn new(facets: Vec<u32>, at: [f64; 3]) -> Self {
-        Self { facets, at, ..Self::default() }
+    pub fn new(mut facets: Vec<u32>, at: [f64; 3]) -> Self {
+        let facets_more = facets.len().saturating_sub(Self::FACETS_MAX);
+        facets.truncate(Self::FACETS_MAX);
+        Self { facets, facets_more, at, ..Self::default() }
     }
 }
 

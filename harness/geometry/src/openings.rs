@@ -63,7 +63,6 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
         let mut facets: Vec<u32> = component.iter().map(|(_, segment)| segment.facet).collect();
         facets.sort_unstable();
         facets.dedup();
-        facets.truncate(Place::FACETS_MAX);
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
         let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
         (Place { width: Some(free_width(&ends)), ..Place::new(facets, centre) }, extent)

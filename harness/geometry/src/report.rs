@@ -136,9 +136,9 @@ impl Diagnosis {
         };
         let text = format!("\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0);
         writeln!(f, "{}", text.trim_end())?;
-        for Place { facets, at, width } in places {
+        for Place { facets, facets_more, at, width } in places {
             let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
-            let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
+            let dots = if *facets_more > 0 { ", ..." } else { "" };
             let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
             let at = point(self.root.rounded(*at));
             let (width, facets) = (width.unwrap_or_default(), facets.join(", "));
@@ -261,7 +261,7 @@ mod tests {
             facet_first: 3,
             facets,
         };
-        let mut lower_bound = finding(Kind::Intersections, 2, 2, one(0..8));
+        let mut lower_bound = finding(Kind::Intersections, 2, 2, one(0..9));
         lower_bound.is_lower_bound = true;
         Diagnosis {
             schema: SCHEMA,
@@ -278,7 +278,7 @@ mod tests {
                 finding(Kind::Winding, 0, 0, vec![]),
                 lower_bound,
                 finding(Kind::ThinWalls, 4, 4, vec![sheet]),
-                finding(Kind::InsideOut, 1, 0, one(0..7)),
+                finding(Kind::InsideOut, 1, 0, one(0..8)),
             ],
             changes_region: true,
         }
@@ -298,7 +298,7 @@ mod tests {
             at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n  and 1 more (--limit)\n\n\
             facets of thin walls: 4; 4 can change the mesh's region\n  Meaning of ThinWalls.\n  \
             at (0.1, 2, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
-            closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7\n\n\
             at least one finding can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
     }
