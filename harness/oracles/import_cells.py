@@ -10,8 +10,6 @@ import numpy as np
 
 from imports import LEVEL_MAX, TOLERANCE, Refused, run
 
-UNIT = {"origin": [0.0, 0.0, 0.0], "edge": 1.0}
-
 
 def numbers(text, kind=np.float64):
     """The numbers in a text, up to the first word that is none."""
@@ -142,7 +140,7 @@ def rows(columns, request):
         edges = columns["edge"]
     else:
         level = column("level")
-        root = request["root"] or (UNIT if position == "index" else None)
+        root = request["root"]
         if root is None:
             raise Refused("has levels, which give no edges without a root: give it with --root X,Y,Z,EDGE or --case CASE")
         wrong = np.flatnonzero(~((level >= 0) & (level <= LEVEL_MAX) & (level % 1 == 0)))

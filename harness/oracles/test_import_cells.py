@@ -133,8 +133,7 @@ class CellsTest(unittest.TestCase):
         self.assertEqual(more["sides"].tolist(), [0, 2])
         corners, edges, _ = read(self.table("0 0 0 1\n7 0 0 3\n"), root=root, position="index")
         self.assertEqual(corners.tolist(), [[1, 2, 3], [8, 2, 3]])
-        corners, _, more = read(self.table("0 0 1 1"), position="index")
-        self.assertEqual((corners.tolist(), more["root"]["edge"]), ([[0, 0, 0.5]], 1))
+        self.assertIn("give it with --root", self.refused(self.table("0 0 1 1"), position="index"))
         corners, edges, more = read(self.table("edge,z,y,x\n2,3,2,1"), position="centre")
         self.assertEqual((corners.tolist(), edges.tolist(), more["root"]), ([[0, 1, 2]], [2], None))
 
