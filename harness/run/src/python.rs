@@ -57,7 +57,8 @@ fn explained(failure: Failure) -> Failure {
         End::Exited { code, error }
             if code == CODE_MISSING || error.contains("ModuleNotFoundError") =>
         {
-            Failure::new(failure.program, End::Missing(format!("is not installed: {error}")))
+            let why = format!("needs a package of Python that is missing: {error}");
+            Failure::new(failure.program, End::Missing(why))
         }
         _ => failure,
     }
@@ -167,7 +168,10 @@ mod tests {
     fn each_failure_has_its_own_message() {
         let sentence = |script: &str| ask(script).unwrap_err().to_string();
         let missing = ask("echo no module >&2; exit 3").unwrap_err().end;
-        assert_eq!(missing, End::Missing("is not installed: no module".into()));
+        assert_eq!(
+            missing,
+            End::Missing("needs a package of Python that is missing: no module".into())
+        );
         assert_eq!(sentence("echo bang >&2; exit 1"), "trimesh ended with code 1: bang");
         assert_eq!(sentence("kill -11 $$"), "trimesh was killed by signal 11");
         assert_eq!(sentence("sleep 60"), "trimesh did not end within 2 s and was killed");
