@@ -9,10 +9,10 @@ use contract::mesh::Mesh;
 use contract::octant::LEVEL_MAX;
 use contract::word::Side;
 use export::selection::{Selection, Slice};
-use run::engine::layout::Layout;
+use run::engine::layout::{Layout, SERIAL};
 use run::engine::paths::Paths;
 pub use run::engine::paths::{Input, Output};
-use run::engine::runner::{Given, Programs};
+use run::engine::runner::{Engine, Given, Programs};
 pub use run::verify::options::whole_seconds;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -139,16 +139,19 @@ impl SelectionArguments {
 pub struct MeshArguments {
     /// A leaf-set directory, a case file (.toml) or a name in geometries/catalogue.toml
     #[arg(value_name = "CASE|DIR")]
-    pub mesh: String,
-    /// The case file of a leaf-set directory, which provides the geometry
+    mesh: String,
+    /// The case of a leaf-set directory, which provides the geometry: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
-    pub case: Option<Input>,
-    /// Time limit for meshing a case
-    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
-    timeout: Duration,
-    /// The program that meshes a case.
-    #[command(flatten)]
-    engine: EngineArguments,
+    case: Option<String>,
+    /// Time limit for meshing a case [default: 600]
+    #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
+    timeout: Option<Duration>,
+    /// The program that meshes a case: name in harness/engines or path of an engine description [default: mesher]
+    #[arg(long)]
+    engine: Option<String>,
+    /// The program of the engine [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    mesher: Option<Input>,
 }
 
 /// A leaf-set directory. One that was made is deleted with this value.
@@ -167,21 +170,23 @@ impl MeshArguments {
     pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>)> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
-            let EngineArguments { engine, programs } = &self.engine;
-            let is_given = programs.mesher.is_some() || programs.reference.is_some();
-            let why = format!("{} is meshed already: omit the programs", self.mesh);
-            Failure::unless(engine == "mesher" && !is_given, why)?;
-            let case = self.case.as_deref().map(Case::read).transpose()?;
+            let Self { engine, mesher, timeout, .. } = self;
+            let is_plain = engine.is_none() && mesher.is_none() && timeout.is_none();
+            let why = format!("{} is meshed already: omit the options for meshing", self.mesh);
+            Failure::unless(is_plain && !ungraded && *layout == SERIAL, why)?;
+            let case = self.case.as_deref().map(read_case).transpose()?;
             return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }
         let why = format!("{} is not a leaf-set directory, which --case requires", self.mesh);
         Failure::unless(self.case.is_none(), why)?;
-        let Programs { engine, paths, .. } = self.engine.find()?;
+        let (name, paths) = (self.engine.as_deref().unwrap_or("mesher"), Paths::find());
+        let engine = Engine::find(name, self.mesher.as_deref(), &paths)?;
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
-        let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), self.timeout))?;
+        let limit = self.timeout.unwrap_or(Duration::from_secs(600));
+        let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), limit))?;
         Ok((Meshed { dir, made: Some(made) }, Some(case)))
     }
 }

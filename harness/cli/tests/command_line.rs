@@ -131,7 +131,9 @@ fn what_cannot_be_meant_is_invalid_input() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("f.json");
     fs::write(&file, "no record").unwrap();
-    let file = file.to_str().unwrap();
+    let fifo = place.path().join("fifo.toml");
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    let [directory, file, fifo] = [place.path(), &file, &fifo].map(|path| path.to_str().unwrap());
     for (arguments, why) in [
         (&["track", "missing.jsonl"][..], "missing.jsonl is missing"),
         (&["track", file, "--alpha", "7"], "a number from 0.000001 to 1"),
@@ -147,8 +149,11 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["bench", "--show", "--timeout", "9"], "cannot be used with"),
         (&["bench", "--show", "--mesher", file], "cannot be used with"),
         (&["shrink", file, "--test-only", "--out", "x"], "cannot be used with"),
-        (&["why", place.path().to_str().unwrap(), "0,0,0", "--engine", "x"], "is meshed already"),
-        (&["why", place.path().to_str().unwrap(), "0,0,0", "--mesher", file], "is meshed already"),
+        (&["verify", "cube", "--size", "large"], "cannot be used with"),
+        (&["verify", "cube", "--no-mpi", "--engine", fifo], "give a file\n"),
+        (&["why", directory, "0,0,0", "--engine", "x"], "is meshed already"),
+        (&["why", directory, "0,0,0", "--mesher", file], "is meshed already"),
+        (&["why", directory, "0,0,0", "--timeout", "600"], "is meshed already"),
     ] {
         let output = harness(arguments);
         let message = String::from_utf8(output.stderr).unwrap();
@@ -311,6 +316,24 @@ fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
     fixture.interrupt(run, &["INT"]);
     let record = fs::read_to_string(fixture.path().join("record.jsonl")).unwrap();
     assert!(record.contains("session") && !record.contains("network"), "{record}");
+}
+
+#[test]
+fn without_runs_on_mpi_the_network_is_not_measured() {
+    let fixture = Fixture::new();
+    fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+    fixture.program("mesher", "#!/bin/sh\nexit 1\n");
+    fixture.program("pingpong", "");
+    fixture.program("launcher", "#!/bin/sh\ntest $1 = --version || touch \"$PLACE/launched\"\n");
+    let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [2]\n";
+    fs::write(fixture.path().join("study.toml"), series).unwrap();
+    let bench = ["bench", "study.toml", "--record", "record.jsonl", "--mesher", "./mesher"];
+    for (options, is_launched) in [(&["--no-mpi"][..], false), (&[], true)] {
+        let launcher = ["--launcher", "./launcher {ranks}"];
+        let mut run = fixture.start(&[&bench[..], &launcher, options].concat());
+        assert_eq!(run.wait().unwrap().code(), Some(1), "{options:?}");
+        assert_eq!(fixture.path().join("launched").exists(), is_launched, "{options:?}");
+    }
 }
 
 #[test]

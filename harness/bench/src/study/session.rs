@@ -374,7 +374,8 @@ impl Session<'_> {
 
     /// Records the cost of messages, on which all projections depend.
     fn measure_network(&mut self) -> Result<()> {
-        let network = match network::measured(&self.runner) {
+        let left_out = self.mpi_left_out().map(|why| Err(why.to_owned()));
+        let network = match left_out.unwrap_or_else(|| network::measured(&self.runner)) {
             Ok(network) => network,
             Err(_) if interrupt::requested() => return Err(Failure::interrupted()),
             Err(why) => {

@@ -1,6 +1,6 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
-use crate::options::{Output, examples, point, whole_seconds};
+use crate::options::{Input, Output, examples, point, whole_seconds};
 use crate::output::put_forms;
 use clap::Args;
 use contract::case::Case;
@@ -11,7 +11,8 @@ use contract::plain::{PlainCase, StlForm};
 use geometry::leak::{Leaks, Target};
 use report::pretty;
 use run::engine::layout::SERIAL;
-use run::engine::runner::{Given, Programs};
+use run::engine::paths::Paths;
+use run::engine::runner::Engine;
 use run::progress::Progress;
 use std::cell::Cell;
 use std::fs;
@@ -36,9 +37,9 @@ pub struct Arguments {
     /// Time limit of every single run of the mesher
     #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
     timeout: Duration,
-    /// Paths of the programs.
-    #[command(flatten)]
-    programs: Given,
+    /// The mesher [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    mesher: Option<Input>,
 }
 
 /// Searches, prints and writes; returns the exit code.
@@ -46,8 +47,9 @@ pub struct Arguments {
 /// # Errors
 /// If the case cannot be read or meshed, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let programs = Programs::find("mesher", &arguments.programs)?;
-    let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
+    let paths = Paths::find();
+    let mesher = Engine::find("mesher", arguments.mesher.as_deref(), &paths)?;
+    let path = paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
     let place = tempfile::tempdir()?;
     let plain = PlainCase::read(&path)?;
@@ -60,8 +62,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         let spacing = case.root.edge / f64::from(1u32 << level);
         plain.table.insert("spacing_min".into(), spacing.into());
         let file = plain.write(place.path(), StlForm::Binary)?;
-        let mesh = programs.mesher.mesh(&file, &SERIAL, true, (place.path(), arguments.timeout))?;
-        let tree = programs.mesher.read_mesh(&mesh)?;
+        let mesh = mesher.mesh(&file, &SERIAL, true, (place.path(), arguments.timeout))?;
+        let tree = mesher.read_mesh(&mesh)?;
         fs::remove_dir_all(mesh)?;
         Ok(tree)
     };

@@ -3,12 +3,11 @@
 use crate::options::{MeshArguments, Output, SelectionArguments, examples, number_in};
 use crate::output::put;
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure, Result};
+use contract::failure::{EXIT_HOLDS, Result};
 use contract::mesh::Mesh;
 use report::picture::colour::Colour;
 use report::picture::{Picture, Request, format_of};
 use run::engine::layout::{Layout, Ranks, SERIAL};
-use std::path::Path;
 
 /// `harness picture`.
 #[derive(Args, Debug)]
@@ -44,8 +43,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
     let format = format_of(out)?;
-    let why = "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
-    Failure::unless(ranks.is_none() && !*ungraded || !Path::new(&source.mesh).is_dir(), why)?;
     let layout = match *ranks {
         Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
         None => SERIAL.clone(),

@@ -7,7 +7,8 @@ use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
-use run::engine::runner::{Given, Programs};
+use run::engine::paths::Paths;
+use run::engine::runner::Engine;
 use std::fs;
 use std::time::Duration;
 
@@ -27,9 +28,9 @@ pub struct Arguments {
 /// # Errors
 /// If a case cannot be meshed.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let given = Given { reference: arguments.reference.clone(), ..Given::default() };
-    let programs = Programs::find("mesher", &given)?;
-    programs.reference.require()?;
+    let given = arguments.reference.as_deref();
+    let reference = Engine::find("reference", given, &Paths::find())?;
+    reference.require()?;
     let scratch = tempfile::tempdir()?;
     let meshed = selftest::cases().into_iter().map(|(name, text)| {
         let directory = scratch.path().join(name);
@@ -38,8 +39,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         // The mesh, and the base tree T0.
         let made = |name, ungraded| {
             let place = (&*directory.join(name), LIMIT);
-            let meshed = programs.reference.mesh(&path, &SERIAL, ungraded, place);
-            let read = meshed.and_then(|mesh| programs.reference.read_mesh(&mesh));
+            let meshed = reference.mesh(&path, &SERIAL, ungraded, place);
+            let read = meshed.and_then(|mesh| reference.read_mesh(&mesh));
             read.map_err(|failure| match &failure.end {
                 End::Missing(_) | End::Interrupted => Failure::from(failure),
                 _ => {

@@ -63,7 +63,7 @@ pub fn family() {
     let leak = "leak open.toml --from 0.3,0.2,0.2 --timeout 600 --json l.json";
     check(
         "leak --timeout 600",
-        preloaded(HARNESS, &format!("{leak} {programs}")),
+        preloaded(HARNESS, &format!("{leak} --mesher {mesher}")),
         1,
         Some("l.json"),
     );

@@ -182,12 +182,13 @@ fn new(
 pub fn all(with_mpi: bool) -> Vec<Program> {
     use Kind::{Harness, Mesher, Rank, Reference};
     let mesh = "case.toml --out out --json run.json --write words,htg --quiet";
-    let programs = concat_programs();
-    let verify =
-        format!("verify case.toml --no-mpi --no-oracles --no-p4est --out report {programs}");
+    let [mesher, reference] = ["mesher", "reference"]
+        .map(|name| program(name).expect("it was built").display().to_string());
+    let verify = format!(
+        "verify case.toml --no-mpi --no-oracles --no-p4est --out report --mesher {mesher} --reference {reference}"
+    );
     let gate = format!(
-        "gate --rules gate.toml --layers counters --record r.json --junit g.xml --json g.json --markdown g.md {}",
-        concat_mesher()
+        "gate --rules gate.toml --layers counters --record r.json --junit g.xml --json g.json --markdown g.md --baseline {mesher} --mesher {mesher}"
     );
     let track = "track history.jsonl --value case/x=3 --repository";
     let repository = env!("CARGO_MANIFEST_DIR");
@@ -243,7 +244,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             ..new(
                 "leak",
                 Harness,
-                format!("leak open.toml --from 0.3,0.2,0.2 --json l.json {programs}"),
+                format!("leak open.toml --from 0.3,0.2,0.2 --json l.json --mesher {mesher}"),
                 &["l.json"],
             )
         },
@@ -265,15 +266,4 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
         }
     }
     all
-}
-
-fn concat_mesher() -> String {
-    let mesher = program("mesher").expect("it was built");
-    format!("--baseline {0} --mesher {0}", mesher.display())
-}
-
-fn concat_programs() -> String {
-    let [mesher, reference] =
-        ["mesher", "reference"].map(|name| program(name).expect("it was built"));
-    format!("--mesher {} --reference {}", mesher.display(), reference.display())
 }

@@ -12,6 +12,7 @@ use contract::manifest::{Enclosed, Keep};
 use contract::octant::LEVEL_MAX;
 use contract::plain::StlForm;
 use serde::Deserialize;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Our own engine files, which belong to the version of the harness.
@@ -147,7 +148,9 @@ impl Description {
             Some((_, text)) => (*text).to_owned(),
             None => contract::files::read_text(&path).map_err(|error| {
                 let engines = engines.display();
-                wrong(format!("{error}: give a name in {engines}, or a path that ends in .toml"))
+                let hint = format!(": give a name in {engines}, or a path that ends in .toml");
+                let is_missing = error.kind() == io::ErrorKind::NotFound;
+                wrong(format!("{error}{}", if is_missing { hint } else { String::new() }))
             })?,
         };
         let here = path.parent().unwrap_or(Path::new(""));

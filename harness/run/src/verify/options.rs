@@ -46,7 +46,7 @@ pub struct Options {
     /// Names in geometries/catalogue.toml or paths of case files [default: all of --size]
     pub cases: Vec<String>,
     /// Sizes of the catalogue's cases
-    #[arg(long, value_delimiter = ',', default_value = "small")]
+    #[arg(long, value_delimiter = ',', default_value = "small", conflicts_with = "cases")]
     pub size: Vec<Size>,
     /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
     #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
