@@ -351,6 +351,8 @@ def main():
     kept = {record["name"]: record for record in kept if record["name"] in names and record["outcome"] in ("noticed", "timed out", REFUSED)}
     viable = [mutant for mutant in mutants if kept.get(mutant["name"], {}).get("outcome") != REFUSED]
     for _ in range(ROUNDS):
+        if not viable:
+            fail(3, f"none of {len(apart) + len(mutants)} changes of {given.crate} compiles and can be selected at run time: take more of them")
         write_changes(tree, viable, sources, roots)
         # With all changes, a crate in one unit takes ten minutes and 9 GB to compile.
         units = f"profile.dev.package.{given.crate}.codegen-units=16"
