@@ -23,7 +23,7 @@ const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
 /// A piece in the form in which it is written.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Piece {
     /// Number of points.
     pub points: u64,
@@ -33,14 +33,6 @@ pub struct Piece {
     pub offsets: Vec<u64>,
     /// The compressed arrays.
     pub bytes: Vec<u8>,
-}
-
-impl Piece {
-    /// Adds an array of values, compressed.
-    pub fn add<T: NoUninit>(&mut self, values: impl ExactSizeIterator<Item = T>, zlib: &mut Zlib) {
-        self.offsets.push(self.bytes.len() as u64);
-        zlib.append(values, &mut self.bytes);
-    }
 }
 
 /// Encodes pieces one after the other. New memory for every piece would cost a page fault per page.
@@ -68,25 +60,27 @@ impl Encoder {
             self.digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
         }
         let Self { leaves, points, connectivity, zlib, .. } = self;
-        let (points, cells) = (&points.all, 0..leaves.len());
+        let points = &points.all;
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);
-        let (of_points, of_cells) = (points.len() as u64, cells.len() as u64);
-        let mut piece = Piece { points: of_points, cells: of_cells, ..Piece::default() };
+        let cells = 0..leaves.len();
+        let (mut bytes, mut offsets) = (Vec::new(), Vec::new());
         for (_, name, _) in arrays {
+            offsets.push(bytes.len() as u64);
+            let to = &mut bytes;
             match *name {
-                "Points" => piece.add(points.iter().map(|at| to_user(at, root)), zlib),
-                "connectivity" => piece.add(connectivity.iter().map(|&i| u64::from(i)), zlib),
-                "offsets" => piece.add(cells.clone().map(|i| 8 * (i as u64 + 1)), zlib),
-                "types" => piece.add(cells.clone().map(|_| HEXAHEDRON), zlib),
-                "level" => piece.add(leaves.iter().map(|leaf| leaf.octant.level), zlib),
-                "rank" => piece.add(leaves.iter().map(|leaf| leaf.rank), zlib),
-                "spacing" => piece.add(leaves.iter().map(edge), zlib),
-                "id" => piece.add(leaves.iter().map(|leaf| leaf.index), zlib),
-                _ => piece.add(leaves.iter().map(|leaf| leaf.side as u8), zlib),
+                "Points" => zlib.append(points.iter().map(|at| to_user(at, root)), to),
+                "connectivity" => zlib.append(connectivity.iter().map(|&i| u64::from(i)), to),
+                "offsets" => zlib.append(cells.clone().map(|i| 8 * (i as u64 + 1)), to),
+                "types" => zlib.append(cells.clone().map(|_| HEXAHEDRON), to),
+                "level" => zlib.append(leaves.iter().map(|leaf| leaf.octant.level), to),
+                "rank" => zlib.append(leaves.iter().map(|leaf| leaf.rank), to),
+                "spacing" => zlib.append(leaves.iter().map(edge), to),
+                "id" => zlib.append(leaves.iter().map(|leaf| leaf.index), to),
+                _ => zlib.append(leaves.iter().map(|leaf| leaf.side as u8), to),
             }
         }
         leaves.clear();
-        piece
+        Piece { points: points.len() as u64, cells: cells.len() as u64, offsets, bytes }
     }
 
     /// Finds the points.
@@ -124,7 +118,7 @@ impl Encoder {
 const BLOCK: usize = 24 << 12;
 
 /// A compressor and its memory.
-pub struct Zlib {
+struct Zlib {
     compressor: Compressor,
     block: Vec<u8>,
 }
