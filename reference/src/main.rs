@@ -65,10 +65,10 @@ fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(e) => {
-            return ExitCode::from(if e.print().is_ok() {
-                e.exit_code() as u8
-            } else {
-                EXIT_OUTPUT
+            return ExitCode::from(match e.print() {
+                Err(e) if e.kind() != ErrorKind::BrokenPipe => EXIT_OUTPUT,
+                // A closed pipe is no reason to fail.
+                _ => e.exit_code() as u8,
             });
         }
     };

@@ -293,12 +293,14 @@ fn a_full_device_is_an_error_of_output() {
 #[test]
 fn a_closed_pipe_is_no_error() {
     let directory = directory_with_case(CASE);
-    let (reader, writer) = std::io::pipe().unwrap();
-    drop(reader);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
-    let run = command.current_dir(directory.path()).arg("case.toml").stdout(writer).output();
-    let run = run.unwrap();
-    assert_eq!((run.status.code(), run.stderr), (Some(0), Vec::new()));
+    for argument in ["case.toml", "--help"] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
+        let run = command.current_dir(directory.path()).arg(argument).stdout(writer).output();
+        let run = run.unwrap();
+        assert_eq!((run.status.code(), run.stderr), (Some(0), Vec::new()), "{argument}");
+    }
 }
 
 /// A run stops itself at a point, so that the outcome does not depend on time. A signal that finds the mesh complete is ignored.
