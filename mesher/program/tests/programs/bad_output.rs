@@ -220,13 +220,16 @@ fn a_full_device_is_an_error_of_output() {
     let warned = "sheet.stl --spacing-min 0.5 --root 0,0,0,8 --keep inside";
     let sheet = [[[1.0f32, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]];
     workspace.write("sheet.stl", crate::process::binary_stl(&sheet));
+    workspace.write("runs", "[\"body.stl\", \"--spacing-min\", \"0.5\"]\n".repeat(2));
     for (args, code) in [
         (format!("{body} > full"), OUTPUT),
         (format!("{body} > null"), 0),
         (format!("{body} --json full > null"), OUTPUT),
         (format!("{body} --json null > null"), 0),
         ("--help > full".to_owned(), OUTPUT),
-        ("--help > full".to_owned(), OUTPUT),
+        ("--serve < runs > full".to_owned(), OUTPUT),
+        ("--serve < runs > null".to_owned(), 0),
+        ("--serve < runs | true".to_owned(), 0),
         (format!("{warned} > null 2> full"), OUTPUT),
         ("absent.stl --spacing-min 0.5 2> full".to_owned(), INPUT),
         (format!("{body} | true"), 0),
