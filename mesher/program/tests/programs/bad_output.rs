@@ -82,6 +82,19 @@ fn a_write_that_fails_in_the_middle_leaves_no_files() {
     }
 }
 
+/// Each simulated rank has the directory and its file open.
+#[test]
+fn a_limit_on_open_files_is_no_matter_of_the_directory() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let args = "body.stl --spacing-min 0.5 --quiet --out mesh --comm sim:100";
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -n 64; exec '{MESHER}' {args}")]);
+    let words = ["mesh", "Too many open files", "raise ulimit"];
+    run(workspace.enter(command)).refuses(OUTPUT, &words);
+    assert!(!workspace.path().join("mesh").exists());
+}
+
 /// Needs the right to mount a small file system.
 #[test]
 fn full_and_read_only_disks_are_refused() {
