@@ -114,7 +114,7 @@ pub struct Generator {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeneratorError {
     /// The shape does not have this dimension.
-    #[error("the shape {shape} has no dimension `{key}`; it has {known}")]
+    #[error("[generator] the shape {shape} has no dimension `{key}`; it has {known}")]
     UnknownDimension {
         /// The shape.
         shape: Shape,

@@ -238,6 +238,15 @@ fn vertices_are_the_same_on_every_machine() {
 }
 
 #[test]
+fn a_pipe_that_is_wider_than_long_has_the_number_of_facets_too() {
+    for facets in [60, 200, 3000] {
+        let size = "radius = 1\nradius_bend = 1.1\nangle = 1\nlength = 0.001";
+        let pipe = table(&format!("shape = 'pipe'\nfacets = {facets}\n{size}"));
+        assert_eq!(pipe.facets().unwrap().len(), facets);
+    }
+}
+
+#[test]
 fn invalid_tables_are_refused_with_the_reason() {
     let refusal = |text: &str| match toml::from_str::<Generator>(text) {
         Ok(generator) => generator.facets().unwrap_err().to_string(),

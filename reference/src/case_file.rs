@@ -157,7 +157,7 @@ pub fn read(path: &Path) -> Result<Case, Error> {
             stl::read(&path.parent().unwrap_or(Path::new("")).join(geometry))?
         }
         (None, Some(generator)) => {
-            generator.facets().map_err(|error| invalid(format!("[generator]: {error}")))?
+            generator.facets().map_err(|error| invalid(error.to_string()))?
         }
         _ => {
             let problem = "give either `geometry` or a [generator] table, exactly one of the two";

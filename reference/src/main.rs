@@ -65,10 +65,10 @@ fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(e) => {
-            return ExitCode::from(if e.print().is_ok() {
-                e.exit_code() as u8
-            } else {
-                EXIT_OUTPUT
+            return ExitCode::from(match e.print() {
+                Err(e) if e.kind() != ErrorKind::BrokenPipe => EXIT_OUTPUT,
+                // A closed pipe is no reason to fail.
+                _ => e.exit_code() as u8,
             });
         }
     };
@@ -139,10 +139,11 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
         ))?;
     }
     if let Some(Leak { spacing_coarse, spacing_fine, point: [x, y, z], .. }) = mesh.leaks.last() {
+        // At the other spacing, most of them are found again.
+        let same = mesh.leaks.iter().filter(|leak| leak.spacing_coarse == *spacing_coarse).count();
         complain(&format_args!(
-            "warning: {} regions are closed at a coarser spacing and open at {spacing_fine}, for example \
-             at {spacing_coarse} the one at ({x}, {y}, {z}); look for holes there",
-            mesh.leaks.len()
+            "warning: {same} regions are closed at a spacing of {spacing_coarse} and open at \
+             {spacing_fine}, for example the one at ({x}, {y}, {z}); look for holes there"
         ))?;
     }
     let enclosed = &mesh.components.enclosed;

@@ -59,7 +59,8 @@ impl CentreLine {
     /// The finest pipe of at most `facets` facets.
     fn draw_finest(&self, facets: usize) -> Mesh {
         let facets_at = |pitch| self.divisions(pitch).facets();
-        let pitch = pitch_finest(self.total(), facets, facets_at);
+        // A pipe may be wider than long.
+        let pitch = pitch_finest(self.total().max(TAU * self.radius), facets, facets_at);
         draw(self, &self.divisions(pitch))
     }
 

@@ -75,7 +75,7 @@ class Mesh:
     def __init__(self, directory: str | PathLike[str]):
         self.directory = Path(directory)
         self.manifest = json.loads((self.directory / "mesh.json").read_text())
-        parts = sorted(self.directory.glob("leaves-*.npy"))
+        parts = [self.directory / part["file"] for part in self.manifest["parts"]]
         if not parts:
             raise FileNotFoundError(f"{self.directory} has no leaves-*.npy: mesh with --write words, which is the default")
         self.words = np.sort(np.concatenate([np.load(part) for part in parts]))

@@ -98,6 +98,8 @@ struct Problem<'a> {
     rough: [f64; 2],
     /// CPU time of all ranks before the mesh, and to write a cell, in seconds.
     times_s: [f64; 2],
+    /// Bytes of the tree's file for a cell.
+    tree_bytes_per_cell: f64,
     comm: &'a dyn Comm,
 }
 
@@ -155,11 +157,14 @@ impl<'a> Problem<'a> {
         let around_facets = area::leaves_at_surface(&quantised.facets, rules, job.comm);
         let before: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
         let written = job.options.out.as_ref().map_or([false; 2], |o| [o.words, o.tree]);
+        // The surface takes as much of T0, which has no layers, as of layers of two cells.
+        let layers = if job.options.ungraded { 2.0 } else { f64::from(rules.layer_cells_min) };
         let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);
         Self {
             rules,
             rough: [around_facets, boxed_in(&rules.boxes, 0, 0)],
             times_s: [gather(job.comm, &[before]).iter().sum(), times.map(|(_, time)| time).sum()],
+            tree_bytes_per_cell: TREE_BYTES_PER_CELL * f64::max(4.0 / layers, 1.0),
             comm: job.comm,
         }
     }
@@ -217,7 +222,6 @@ impl<'a> Problem<'a> {
         let fits = |t: Option<Tightest>| t.is_none_or(|t| t.needed_bytes <= t.left_bytes);
         let Amounts { cells, .. } = pilot.at(0);
         let fitting = (0..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
-        let thin = f64::max(4.0 / f64::from(self.rules.layer_cells_min), 1.0);
         let [before, written] = self.times_s;
         let plan = Plan {
             schema: "octree-mesher-plan/2",
@@ -227,7 +231,7 @@ impl<'a> Problem<'a> {
             time_cpu_s: before + pilot.at(0).time_cpu_s() + written * cells,
             memory_peak_bytes: ranks.peaks(&ranks.growth(&pilot.at(0))),
             words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + WORDS_HEADER,
-            tree_bytes: (cells * TREE_BYTES_PER_CELL * thin) as u64,
+            tree_bytes: (cells * self.tree_bytes_per_cell) as u64,
             tightest: tightest_at(0),
             fits: fitting == Some(0),
             spacing_factor_fits: fitting.filter(|s| *s > 0).map(|s| 2f64.powi(s as i32)),
@@ -287,14 +291,12 @@ impl fmt::Display for Plan {
         writeln!(f, "peak memory    {all} over all ranks, {most} on a rank at most")?;
         let [words, tree] = [self.words_bytes, self.tree_bytes].map(bytes);
         writeln!(f, "files          leaf words of {words} per rank; or a tree of {tree}")?;
-        match self.tightest {
-            None => write!(f, "fits           no limit is known"),
-            Some(Tightest { limit, left_bytes, needed_bytes }) => {
-                let fits = if self.fits { "yes" } else { "no" };
-                let [needed, left] = [needed_bytes, left_bytes].map(bytes);
-                write!(f, "fits           {fits}: needs {needed} more, the {limit} has {left} left")
-            }
-        }
+        let Some(Tightest { limit, left_bytes, needed_bytes }) = self.tightest else {
+            return write!(f, "fits           no limit is known");
+        };
+        let fits = if self.fits { "yes" } else { "no" };
+        let [needed, left] = [needed_bytes, left_bytes].map(bytes);
+        write!(f, "fits           {fits}: needs {needed} more, the {limit} has {left} left")
     }
 }
 

@@ -15,7 +15,13 @@ fn with_problem<T>(level_surface: Level, test: impl FnOnce(&Problem) -> T) -> T 
     let keep = Keep::Outside;
     let rules = Rules { root, level_surface, layer_cells_min: 4, keep, ..plain_rules() };
     let rough = [ROUGH * 4f64.powi(level_surface as i32 - 13), 0.0];
-    test(&Problem { rules: &rules, rough, times_s: [2.0, 0.0], comm: &Solo })
+    test(&Problem {
+        rules: &rules,
+        rough,
+        times_s: [2.0, 0.0],
+        tree_bytes_per_cell: TREE_BYTES_PER_CELL,
+        comm: &Solo,
+    })
 }
 
 /// Cells and bytes of a mesh that is coarser by some levels.
@@ -78,6 +84,22 @@ fn what_is_written_takes_time() {
         Problem::new(&quantised, &job).times_s[1]
     };
     assert_eq!([time(true, false), time(false, true), time(true, true)], [4e-9, 2.5e-9, 6.5e-9]);
+}
+
+/// Trees of three large cases took 0.047, 0.043 and 0.071 bytes per cell, in layers of four cells, and 0.084, 0.103 and 0.128 as T0.
+#[test]
+fn the_tree_of_t0_takes_more_for_a_cell() {
+    let bytes = |layer_cells_min, ungraded| {
+        let options = Options { ungraded, ..options() };
+        let mut record = Recorder::default();
+        let mut job = Job::new(&options, &Solo, &mut record);
+        let case = Case { layer_cells_min, ..case() };
+        Problem::new(&mesher::quantised(&case, &mut job).unwrap(), &job).tree_bytes_per_cell
+    };
+    let of_t0 = [1, 4, 9].map(|n| bytes(n, true));
+    assert_eq!(of_t0, [2.0 * TREE_BYTES_PER_CELL; 3]);
+    let graded = [1, 2, 4, 9].map(|n| bytes(n, false));
+    assert_eq!(graded, [4.0, 2.0, 1.0, 1.0].map(|thin| thin * TREE_BYTES_PER_CELL));
 }
 
 #[test]

@@ -148,16 +148,18 @@ struct Done {
     refusal: Option<Error>,
 }
 
-/// Prints warnings and the outcome; returns the exit code. A closed pipe is no reason to fail.
+/// Prints warnings and the outcome; returns the exit code.
 fn print(done: &Done) -> i32 {
     let is_warned = done.warnings.iter().all(|w| complain(&format_args!("mesher: warning: {w}")));
-    match writeln!(stdout(), "{}", done.text).and_then(|()| stdout().flush()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-            fail(&Error::output(format!("standard output: {e}: free disk space")), true)
-        }
-        _ if is_warned => 0,
-        _ => UNPRINTED,
-    }
+    if say(&done.text) && is_warned { 0 } else { UNPRINTED }
+}
+
+/// Prints a line on the standard output; returns whether that was possible. A closed pipe is no reason to fail.
+fn say(line: &dyn Display) -> bool {
+    let printed = writeln!(stdout(), "{line}").and_then(|()| stdout().flush());
+    let failed = printed.err().filter(|e| e.kind() != ErrorKind::BrokenPipe);
+    let why = |e| complain(&format_args!("mesher: standard output: {e}: free disk space"));
+    failed.map(why).is_none()
 }
 
 /// The command line of rank 0, which all ranks follow. Collective.
@@ -185,9 +187,10 @@ fn obey(asked: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     }
 }
 
-/// Runs the command lines that rank 0 reads from its standard input; returns the exit code of this service. Collective.
+/// Runs the command lines that rank 0 reads from its standard input; returns the exit code of this service: on rank 0, that of output that
+/// cannot be written if an answer was not. Collective.
 fn serve(comm: &dyn Comm) -> i32 {
-    let (mut lines, is_first) = (stdin().lines(), comm.rank() == 0);
+    let (mut lines, is_first, mut code_of_job) = (stdin().lines(), comm.rank() == 0, 0);
     loop {
         interrupt::begin();
         // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end, or why nothing can be read.
@@ -199,14 +202,13 @@ fn serve(comm: &dyn Comm) -> i32 {
         comm.next_run();
         let line = uncounted(comm, || text_of_first(comm, &line));
         let Some(line) = line.strip_suffix('\n') else {
-            return if line.is_empty() { 0 } else { fail(&Error::input(line), is_first) };
+            return if line.is_empty() { code_of_job } else { fail(&Error::input(line), is_first) };
         };
         // The peak of this run alone; where that is impossible, it includes those before it.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
         let code = served(line).map_or_else(|e| fail(&e, is_first), |args| run(&args, comm));
-        if is_first {
-            // Who does not read answers asks for no further run.
-            let _ = writeln!(stdout(), "{code}");
+        if is_first && !say(&code) {
+            code_of_job = UNPRINTED;
         }
     }
 }
@@ -326,10 +328,9 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         json.map_or(Ok(()), |_| write_json(&mut bytes, &report)).expect(WRITABLE);
         Done { text: report.to_string(), warnings: report.warnings, refusal: None }
     };
-    let mut advice = "choose another --json or free disk space".to_owned();
-    if options.out.is_some() && !args.plan {
-        advice = format!("the mesh is complete, only its report is missing; {advice}");
-    }
+    let is_made = options.out.is_some() && !args.plan;
+    let made = if is_made { "the mesh is complete, only its report is missing; " } else { "" };
+    let advice = format!("{made}choose another --json or free disk space");
     interrupt::stop_at(format_args!("report:{}", comm.rank()));
     let write = |path: &Path| write_atomically(path, |out| out.write_all(&bytes));
     agree(comm, on_json(&advice, &write)).map(|()| done)

@@ -32,7 +32,8 @@ fn the_mesh_is_the_serial_one() {
         let division = ["--partitioner", partitioner, "--level-base", level_base];
         run(workspace.mpirun(ranks, &[&args[..], &division].concat())).succeeds();
         let report = workspace.json("run.json");
-        for same in ["cells", "digest", "cells_by_level", "cells_by_side", "components"] {
+        for same in ["cells", "digest", "leaves_by_level", "leaves_by_side", "components"] {
+            assert!(!serial[same].is_null(), "the report must have {same}");
             assert_eq!(report[same], serial[same], "{same} on {ranks} ranks");
         }
         assert_eq!(report["ranks"], ranks);
@@ -127,7 +128,8 @@ fn a_run_of_a_service_is_a_run_of_its_own() {
         let own = workspace.json("own.json");
         for name in ["first", "last"] {
             let report = workspace.json(&format!("{name}.json"));
-            for same in ["ranks", "cells", "digest", "counters", "cells_by_level"] {
+            for same in ["ranks", "cells", "digest", "counters", "leaves_by_level"] {
+                assert!(!own[same].is_null(), "the report must have {same}");
                 assert_eq!(report[same], own[same], "{same} of the {name} run on {ranks} ranks");
             }
             let manifest = |name: &str| workspace.json(&format!("{name}/mesh.json"));

@@ -10,7 +10,9 @@ mod world;
 pub use world::{Adversary, Arrival, Schedule, World};
 
 use super::{Comm, Gathered, MessageBuffer, Metered};
+use files::OUT_OF_MEMORY;
 use std::any::Any;
+use std::io::{Write, stderr};
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -60,7 +62,12 @@ fn run_ranks(size: usize, seed: u64, body: &(dyn Fn(&Metered<Sim>) + Sync)) {
                 result
             };
             let builder = std::thread::Builder::new().stack_size(16 << 20);
-            builder.spawn_scoped(scope, run).expect("a thread per simulated rank")
+            builder.spawn_scoped(scope, run).unwrap_or_else(|e| {
+                let line = format!("mesher: no thread for simulated rank {rank}: {e}: {LIMITS}\n");
+                // A launcher puts lines of its own between two writes.
+                let _ = stderr().write_all(line.as_bytes());
+                crate::launch::abort(OUT_OF_MEMORY)
+            })
         };
         let handles: Vec<_> = turns_of.into_iter().enumerate().map(spawn).collect();
         handles.into_iter().filter_map(|t| t.join().flatten().err()).collect()
@@ -70,6 +77,7 @@ fn run_ranks(size: usize, seed: u64, body: &(dyn Fn(&Metered<Sim>) + Sync)) {
     }
 }
 
+const LIMITS: &str = "simulate fewer ranks, or raise the limits (ulimit -v, ulimit -u)";
 const STOPPED: &str = "stopped because another simulated rank panicked";
 
 impl<'a> Sim<'a> {

@@ -52,9 +52,7 @@ pub fn read(source: &Source, comm: &dyn Comm) -> Result<Slice, Error> {
                 None => distribute(comm, || file.read_text())?,
             }
         }
-        Source::Generated(g) => {
-            distribute(comm, || g.facets().map_err(|e| Error::input(format!("[generator]: {e}"))))?
-        }
+        Source::Generated(g) => distribute(comm, || g.facets().map_err(Error::input))?,
         Source::Given(facets) => distribute(comm, || Ok(facets.clone()))?,
     };
     agree(comm, stl::check_finite(&slice.facets, slice.first))?;

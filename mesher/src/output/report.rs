@@ -131,8 +131,7 @@ impl Report {
         }
         let heaviest = self.counters["base_leaf_cells_max"].iter().zip(&self.counters["leaves"]);
         for (rank, (heaviest, leaves)) in heaviest.enumerate() {
-            let fits = heaviest <= leaves;
-            assert!(fits, "rank {rank}: a base leaf of {heaviest} of {leaves} leaves");
+            assert!(heaviest <= leaves, "rank {rank}: a base leaf of {heaviest} of all {leaves}");
         }
         let Summary { outside, inside, enclosed: e, ambiguous: a, .. } = mesh.components;
         let is_right = e.count <= outside.min(e.leaves) && e.example.is_some() == (e.count > 0);

@@ -14,20 +14,19 @@ const BOXES_WITHOUT_EFFECT: &str = "an extent box ([[box]]) has no volume within
 const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the root unless the body is meant to \
     extend beyond it";
 
-/// A sentence for each warning: what was found, and what to try. T0 has those of leaks only: nothing is deleted from it yet.
+/// A sentence for each warning: what was found, and what to try. Nothing is deleted from T0 yet, so it has those of its inputs, rays and leaks
+/// only.
 pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
-    let leaks = of_leaks(mesh, case_name);
-    if mesh.is_base {
-        return leaks.into_iter().collect();
-    }
+    let (leaks, is_final, keep) = (of_leaks(mesh, case_name), !mesh.is_base, mesh.rules.keep);
     let summary = &mesh.sides.summary;
-    let empty = empty_region(mesh.rules.keep, summary);
+    let empty = empty_region(keep, summary).filter(|_| is_final);
+    let flow_at_boundary = is_final && summary.inside_reaches_boundary;
     // These two already advise to enlarge the root.
-    let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
+    let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
     let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let others = [
-        (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),
-        (summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
+        (flow_at_boundary, FLOW_AT_BOUNDARY),
+        (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
     ];

@@ -50,7 +50,7 @@ pub struct OutDir {
 }
 
 fn output(path: &Path, e: impl Display) -> Error {
-    let advice = "no mesh was written there; choose another --out or free disk space";
+    let advice = "no mesh was written there; choose another --out, free disk space or raise ulimit";
     Error::output(format!("{e}: {advice}")).at(path)
 }
 

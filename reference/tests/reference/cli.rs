@@ -1,4 +1,5 @@
 //! The program as its users see it: exit codes, messages and files.
+use crate::gaps::slotted_box;
 use reference::lattice::Input;
 use reference::leaves::{Geometry, Tally, hex};
 use reference::{Keep, case_file, digest, mesh};
@@ -293,12 +294,36 @@ fn a_full_device_is_an_error_of_output() {
 #[test]
 fn a_closed_pipe_is_no_error() {
     let directory = directory_with_case(CASE);
-    let (reader, writer) = std::io::pipe().unwrap();
-    drop(reader);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
-    let run = command.current_dir(directory.path()).arg("case.toml").stdout(writer).output();
-    let run = run.unwrap();
-    assert_eq!((run.status.code(), run.stderr), (Some(0), Vec::new()));
+    for argument in ["case.toml", "--help"] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
+        let run = command.current_dir(directory.path()).arg(argument).stdout(writer).output();
+        let run = run.unwrap();
+        assert_eq!((run.status.code(), run.stderr), (Some(0), Vec::new()), "{argument}");
+    }
+}
+
+/// A box with a slit of three cells is closed at twice and at four times the spacing.
+#[test]
+fn a_warning_counts_a_region_that_leaks_once() {
+    let facets = slotted_box([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 3.0, [0.0; 2]);
+    let vertex = |[x, y, z]: &[i64; 3]| format!("vertex {x} {y} {z} ");
+    let facet = |f: &[[i64; 3]; 3]| {
+        let vertices: String = f.iter().map(vertex).collect();
+        format!("facet normal 0 0 0 outer loop {vertices} endloop endfacet\n")
+    };
+    let facets: String = facets.iter().map(facet).collect();
+    let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 134217728.0\n";
+    let case = format!("geometry = \"box.stl\"\nspacing_min = 4194304.0\n{root}");
+    let directory = directory_with_case(&case);
+    fs::write(directory.path().join("box.stl"), format!("solid box\n{facets}endsolid box\n"))
+        .unwrap();
+    let run = reference(directory.path(), &["case.toml", "--out", "mesh"]);
+    assert_eq!(manifest(&directory.path().join("mesh"))["leaks"].as_array().unwrap().len(), 2);
+    let expected = "warning: 1 regions are closed at a spacing of 16777216 and open at 4194304, ";
+    let warning = String::from_utf8(run.stderr).unwrap();
+    assert!(warning.starts_with(expected) && warning.lines().count() == 1, "{warning}");
 }
 
 /// A run stops itself at a point, so that the outcome does not depend on time. A signal that finds the mesh complete is ignored.

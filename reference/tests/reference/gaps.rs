@@ -16,7 +16,7 @@ const CELL: f64 = (ROOT_EDGE >> LEVEL) as f64;
 const WIDTHS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 
 /// Unit vectors across the slit, along it, and normal to the sheet.
-type Frame = [[f64; 3]; 3];
+pub type Frame = [[f64; 3]; 3];
 
 /// The orientations of the table, with the names of its columns.
 fn orientations() -> [(&'static str, Frame); 4] {
@@ -34,7 +34,11 @@ fn orientations() -> [(&'static str, Frame); 4] {
 
 /// A box of ten cells, one of whose faces has a slit of a width given in cells. Its centre is that of
 /// the root, moved by `offset` cells across the slit and along the normal of the sheet.
-fn slotted_box([across, along, normal]: Frame, width: f64, offset: [f64; 2]) -> Vec<[[i64; 3]; 3]> {
+pub fn slotted_box(
+    [across, along, normal]: Frame,
+    width: f64,
+    offset: [f64; 2],
+) -> Vec<[[i64; 3]; 3]> {
     let point = |[u, v, n]: [f64; 3]| {
         let [u, n] = [u + offset[0], n + offset[1]];
         let at = |a: usize| 16.0 + u * across[a] + v * along[a] + n * normal[a];

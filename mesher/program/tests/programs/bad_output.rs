@@ -82,6 +82,19 @@ fn a_write_that_fails_in_the_middle_leaves_no_files() {
     }
 }
 
+/// Each simulated rank has the directory and its file open.
+#[test]
+fn a_limit_on_open_files_is_no_matter_of_the_directory() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let args = "body.stl --spacing-min 0.5 --quiet --out mesh --comm sim:100";
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -n 64; exec '{MESHER}' {args}")]);
+    let words = ["mesh", "Too many open files", "raise ulimit"];
+    run(workspace.enter(command)).refuses(OUTPUT, &words);
+    assert!(!workspace.path().join("mesh").exists());
+}
+
 /// Needs the right to mount a small file system.
 #[test]
 fn full_and_read_only_disks_are_refused() {
@@ -220,13 +233,16 @@ fn a_full_device_is_an_error_of_output() {
     let warned = "sheet.stl --spacing-min 0.5 --root 0,0,0,8 --keep inside";
     let sheet = [[[1.0f32, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]];
     workspace.write("sheet.stl", crate::process::binary_stl(&sheet));
+    workspace.write("runs", "[\"body.stl\", \"--spacing-min\", \"0.5\"]\n".repeat(2));
     for (args, code) in [
         (format!("{body} > full"), OUTPUT),
         (format!("{body} > null"), 0),
         (format!("{body} --json full > null"), OUTPUT),
         (format!("{body} --json null > null"), 0),
         ("--help > full".to_owned(), OUTPUT),
-        ("--help > full".to_owned(), OUTPUT),
+        ("--serve < runs > full".to_owned(), OUTPUT),
+        ("--serve < runs > null".to_owned(), 0),
+        ("--serve < runs | true".to_owned(), 0),
         (format!("{warned} > null 2> full"), OUTPUT),
         ("absent.stl --spacing-min 0.5 2> full".to_owned(), INPUT),
         (format!("{body} | true"), 0),

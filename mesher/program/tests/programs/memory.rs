@@ -125,6 +125,19 @@ fn a_run_without_enough_memory_ends_with_a_sentence_and_no_files() {
     assert!((3..40).contains(&failed), "{failed} limits were too low");
 }
 
+/// Each simulated rank has a thread with a stack of its own.
+#[test]
+fn too_little_memory_for_the_threads_of_simulated_ranks_is_no_bug() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", format!("spacing_min = 0.1\n{BODY}"));
+    let with =
+        |comm| limited(1_000_000, &["case.toml", "--quiet", "--out", "mesh", "--comm", comm]);
+    let words = ["simulated rank ", "simulate fewer ranks", "ulimit -v"];
+    run(workspace.enter(with("sim:500"))).refuses(MEMORY, &words);
+    assert!(!workspace.path().join("mesh").exists());
+    run(workspace.enter(with("sim:5"))).succeeds();
+}
+
 /// A launcher puts lines of its own between two writes of a rank.
 #[test]
 fn a_sentence_is_one_write() {

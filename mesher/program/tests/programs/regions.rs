@@ -227,8 +227,37 @@ fn a_box_that_refines_nothing_produces_a_warning() {
         );
         workspace.write("case.toml", text);
         let finished = run(workspace.mesher(&["case.toml"]));
-        let found = finished.stderr.matches("has no volume within the root").count();
-        assert_eq!((finished.code, found), (Some(0), count), "{corner}: {finished:?}");
+        let base = run(workspace.mesher(&["case.toml", "--ungraded"]));
+        for finished in [finished, base] {
+            let found = finished.stderr.matches("has no volume within the root").count();
+            assert_eq!((finished.code, found), (Some(0), count), "{corner}: {finished:?}");
+        }
+    }
+}
+
+/// What is wrong with the inputs, or guessed, is so in T0 as well; what is kept is of the mesh only.
+#[test]
+fn facets_beyond_the_root_and_rays_that_disagree_produce_warnings_of_t0_too() {
+    let is_said = |facets: &[Facet], options: &[&str], expected: &[&str]| {
+        let (report, _) = meshed(facets, options);
+        let warnings = report["warnings"].as_array().expect("a list");
+        let found = warnings.iter().map(|w| w.as_str().expect("a sentence"));
+        let is_right = found.zip(expected).all(|(found, expected)| found.contains(expected));
+        assert!(is_right && warnings.len() == expected.len(), "{options:?}: {warnings:?}");
+    };
+    let cut = "facets lie wholly or partly beyond the root";
+    let cuboids = |x: f32| cuboid([x, 8.0, 8.0], [56.0; 3]);
+    is_said(&cuboids(-8.0), &["--ungraded"], &[cut]);
+    // All of it: then no hole or copy is to blame for the missing inside.
+    let beyond = cuboid([-40.0, 8.0, 8.0], [-8.0, 56.0, 56.0]);
+    let inside = "nothing is inside the geometry";
+    is_said(&beyond, &["--keep", "inside"], &[inside, cut]);
+    is_said(&beyond, &["--keep", "inside", "--ungraded"], &[inside, cut]);
+    // Of a box without a side whose opening is beyond the root, rays along one axis leave through the opening.
+    let mut open = cuboids(-8.0);
+    open.retain(|f| f.iter().any(|v| v[0] != -8.0));
+    for options in [&[][..], &["--ungraded"]] {
+        is_said(&open, options, &["the rays of 1 components disagree", cut]);
     }
 }
 
