@@ -247,6 +247,11 @@ fn tracked_commits_form_a_history_with_a_change_point() {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
     }
     // Options that would have no effect, and an address that is the same for all commits.
+    for few in [1, 4] {
+        let refused = fixture.harness(&format!("track history.jsonl --fail-recent {few}"));
+        let why = "give at least 5: with fewer";
+        assert!(refused.code == 2 && refused.printed.contains(why), "{}", refused.printed);
+    }
     for unused in ["--commit HEAD", "--repository .", "--link x/{commit}", "--page p --link x"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl {unused}")).code, 2, "{unused}");
     }
@@ -262,6 +267,24 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert_eq!(accepted.code, 0, "{}", accepted.printed);
     assert!(accepted.printed.contains(", accepted"), "{}", accepted.printed);
     assert_eq!(fixture.harness("track history.jsonl --accept f00f00f00f00").code, 2);
+    let without = "accepted without effect: no metric has a step near";
+    assert!(!accepted.printed.contains(without), "{}", accepted.printed);
+    let last = history.lines().nth(15).unwrap().split("\"commit\":\"").nth(1).unwrap();
+    let nowhere = fixture.harness(&format!("track history.jsonl --accept {}", &last[..12]));
+    assert!(nowhere.code == 0 && nowhere.printed.contains(without), "{}", nowhere.printed);
+    // A working tree with changes is no commit, but for those of the history.
+    git("add history.jsonl gate.toml");
+    git("commit --quiet -m history");
+    let track = "track history.jsonl --value case/words=44";
+    let appended = [fixture.harness(track), fixture.harness(track)];
+    for of in appended {
+        assert!(of.code == 0 && of.printed.contains(": history\n"), "{}", of.printed);
+    }
+    fixture.write("gate.toml", "changed");
+    let refused = fixture.harness(track);
+    assert!(refused.code == 2 && refused.printed.contains("give --commit"), "{}", refused.printed);
+    assert_eq!(fixture.harness(&format!("{track} --commit HEAD")).code, 0);
+    git("checkout --quiet gate.toml");
     // A metric that is measured no more is named, and a history of nothing is not green.
     git("commit --quiet --allow-empty -m other");
     let ended = fixture.harness("track history.jsonl --value case/other=1");
