@@ -101,6 +101,21 @@ fn a_program_without_times_is_named() {
 }
 
 #[test]
+fn times_of_different_meshes_are_not_compared() {
+    let fixture = Fixture::new();
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"time\"]\n");
+    let script = fs::read_to_string(fixture.path("engine")).unwrap();
+    fixture.program("other", &script.replace("mesh=right cells=1", "mesh=wrong cells=8"));
+    let gate =
+        "gate --engine engine.toml --rules gate.toml --layers time --budget 1 --baseline engine";
+    let outcome = fixture.harness(&format!("{gate} --candidate other"));
+    let why = "the mesh is another one, so that its numbers are not comparable: its digest: ";
+    assert!(outcome.code == 3 && outcome.printed.contains(why), "{}", outcome.printed);
+    let same = fixture.harness(&format!("{gate} --candidate engine"));
+    assert_ne!(same.code, 3, "{}", same.printed);
+}
+
+#[test]
 fn a_baseline_without_a_mesh_has_no_correctness_to_compare_with() {
     let fixture = Fixture::new();
     let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
@@ -363,6 +378,11 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
     assert_eq!(two.code, 2, "{}", two.printed);
     let again = fixture.harness(&format!("{gate} --baseline HEAD~1 --candidate HEAD"));
     assert!(!again.printed.contains("building"), "{}", again.printed);
+    // A variable of compilers makes another build.
+    let built = fs::read_dir(fixture.path("other/target/gate")).unwrap();
+    let built =
+        built.map(|of| fs::read_to_string(of.unwrap().path().join("built")).unwrap_or_default());
+    assert!(built.filter(|of| of.contains("mpicc: ")).count() == 2);
     let elsewhere = fixture.harness(&format!("{} --baseline HEAD~1", gate.replace("other/", ".")));
     assert_eq!(elsewhere.code, 2, "{}", elsewhere.printed);
 }
