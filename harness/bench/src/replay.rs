@@ -244,7 +244,7 @@ fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
     let scales = base.setup.ranks < group.setup.ranks;
     let ratios = [
         ("bytes per cell", group.bytes_per_cell()),
-        ("load imbalance", (group.setup.ranks > 1).then(|| group.imbalance())),
+        ("load imbalance", group.imbalance().filter(|_| group.setup.ranks > 1)),
         ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
         ("efficiency", scales.then(|| groups.global_efficiency(group))),
     ];
