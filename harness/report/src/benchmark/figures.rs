@@ -1,6 +1,6 @@
 //! Figures over cells: run time (counterparts of the paper's Figures 17 and 18), rate and memory. All numbers of the paper are those of `reports/paper.md`.
 
-use super::groups::{OWN, Subject, cited, is_counterpart, point, provenance, repetitions};
+use super::groups::{OWN, Subject, cited, clocks, is_counterpart, point, provenance, repetitions};
 use super::{models, scaling};
 use crate::figure::{Axis, Figure, Provenance, Series};
 use bench::experiments::entry::Comm;
@@ -9,6 +9,9 @@ use bench::order::{by_key, distinct};
 use contract::paper::number;
 use statistics::Median;
 use std::collections::BTreeSet;
+
+/// Name of the figure that shows no times.
+const MEMORY: &str = "memory";
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -73,7 +76,10 @@ fn over_cells(
     [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (mesh, repetitions) = (subject.mesh(), repetitions(all, &value));
+    let (mesh, mut repetitions) = (subject.mesh(), repetitions(all, &value));
+    if id != MEMORY {
+        repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
+    }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
     let id = format!("{id}-{}", subject.file());
     let title = format!("{title}: {mesh}");
@@ -119,7 +125,7 @@ fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
     let which = format!("{at}. Rates are cells over median times");
     let of_rates = ["Cells per second and core", &which];
     let figure = over_cells(subject, all, names, of_rates, Group::rates);
-    let names = ["memory", "Peak memory per cell", "bytes per cell"];
+    let names = [MEMORY, "Peak memory per cell", "bytes per cell"];
     let of_memory = ["Peak resident memory of all ranks, program and facets included,", &at];
     // One that is unknown is a value of 0, which the axis cannot show.
     let bytes = |group: &Group| group.bytes_per_cell().unwrap_or_default();
