@@ -117,10 +117,10 @@ pub fn imbalance(run: &Run) -> Option<f64> {
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks; `None` if useful times of one are
 /// unknown.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Option<Efficiency> {
-    // The critical path on an ideal network.
-    let path_s = run.phases.iter().map(|p| p.useful_s.max).reduce(|a, b| a + b)?;
-    reference.phases.first()?;
-    let time_s = time_s(run, network);
+    if run.phases.is_empty() || reference.phases.is_empty() {
+        return None;
+    }
+    let (time_s, path_s) = (time_s(run, network), run.path_s());
     let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {
         load_balance: 1.0 / run.useful_s.lambda(run.setup.ranks),
