@@ -159,7 +159,7 @@ pub(super) fn other_mesh([old, new]: [Mesh; 2]) -> Option<String> {
         _ => return None,
     };
     let why = "the mesh is another one, so that its numbers are not comparable";
-    (old != new).then(|| format!("{why}: its {what}: {new}, and before {old}"))
+    (old != new).then(|| format!("{why}: {what} {new}, and {old} in the baseline"))
 }
 
 /// The finding on a digest that is the same if both sides have one. `None` if neither has.

@@ -193,11 +193,11 @@ fn distance(points: &[(usize, f64)], at: usize, commit: usize) -> Option<usize> 
 
 /// Returns of every step whether it was accepted. A commit that was accepted excuses one step, the nearest.
 fn are_accepted(found: &[Step], points: &[(usize, f64)], records: &[Record]) -> Vec<bool> {
-    let off = |at, commit| distance(points, at, commit);
     let mut all = vec![false; found.len()];
     for commit in (0..records.len()).filter(|i| records[*i].accepted) {
-        let near = found.iter().zip(0..).filter_map(|(step, i)| Some((off(step.at, commit)?, i)));
-        near.min().into_iter().for_each(|(_, i): (usize, usize)| all[i] = true);
+        let off = |(step, i): (&Step, usize)| Some((distance(points, step.at, commit)?, i));
+        let near = found.iter().zip(0..).filter_map(off).min();
+        near.into_iter().for_each(|(_, i)| all[i] = true);
     }
     all
 }
