@@ -252,8 +252,10 @@ fn times_of_different_clocks_are_named() {
 /// The model has steps just after powers of two.
 #[test]
 fn the_line_of_a_model_has_integer_ranks_and_those_of_all_runs() {
-    let all = [2, 4, 8, 16, 32, 64, 128, 256];
-    let runs = all.map(|ranks| run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));
+    let all = [2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 256];
+    let meshes =
+        |ranks| [25_000_000, 50_000_000].map(|n| run("strong", Comm::Sim, ranks, n, 4, ""));
+    let runs = all.map(|ranks| meshes(ranks).concat());
     let lines = [vec![session()], runs.concat()].concat();
     let place = tempfile::tempdir().unwrap();
     report(place.path(), &lines).unwrap();

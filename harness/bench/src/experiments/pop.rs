@@ -117,9 +117,8 @@ pub fn imbalance(run: &Run) -> Option<f64> {
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks; `None` if useful times of one are
 /// unknown.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Option<Efficiency> {
-    if run.phases.is_empty() || reference.phases.is_empty() {
-        return None;
-    }
+    // Without phases, useful times are unknown.
+    run.phases.first().and(reference.phases.first())?;
     let (time_s, path_s) = (time_s(run, network), run.path_s());
     let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {

@@ -128,8 +128,8 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     let how = runs.iter().chain([&against]).map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
     let is_above = row.measure.is_efficiency() && value > ABOVE_ONE;
-    let disturbed = if is_above { DISTURBED } else { "" };
-    let why = above_one(&efficiencies).unwrap_or(disturbed.to_owned());
+    let disturbed = is_above.then(|| DISTURBED.to_owned());
+    let why = above_one(&efficiencies).or(disturbed).unwrap_or_default();
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
 }
 

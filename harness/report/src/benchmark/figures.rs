@@ -10,9 +10,6 @@ use contract::paper::number;
 use statistics::Median;
 use std::collections::BTreeSet;
 
-/// Name of the figure that shows no times.
-const MEMORY: &str = "memory";
-
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let by_case = |is_of: &dyn Fn(&Group) -> bool| {
@@ -77,7 +74,7 @@ fn over_cells(
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
     let (mesh, mut repetitions) = (subject.mesh(), repetitions(all, &value));
-    if id != MEMORY {
+    if id != "memory" {
         repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
     }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
@@ -125,7 +122,7 @@ fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
     let which = format!("{at}. Rates are cells over median times");
     let of_rates = ["Cells per second and core", &which];
     let figure = over_cells(subject, all, names, of_rates, Group::rates);
-    let names = [MEMORY, "Peak memory per cell", "bytes per cell"];
+    let names = ["memory", "Peak memory per cell", "bytes per cell"];
     let of_memory = ["Peak resident memory of all ranks, program and facets included,", &at];
     // One that is unknown is a value of 0, which the axis cannot show.
     let bytes = |group: &Group| group.bytes_per_cell().unwrap_or_default();

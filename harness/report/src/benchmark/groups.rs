@@ -49,8 +49,7 @@ pub fn clocks<'a>(groups: impl Iterator<Item = &'a Group>) -> Option<String> {
     let programs = |of: &[&Group]| distinct(of.iter().map(|g| &*g.setup.engine)).join(", ");
     let clocks = of_clock.iter().map(|(clock, of)| format!("{}: {clock}", programs(of)));
     let clocks = clocks.collect::<Vec<_>>().join("; ");
-    let sentence = || format!("Measured times are of different clocks: {clocks}.");
-    (of_clock.len() > 1).then(sentence)
+    (of_clock.len() > 1).then(|| format!("Measured times are of different clocks: {clocks}."))
 }
 
 /// The origin of the times of single ranks, as a sentence.
