@@ -246,7 +246,7 @@ fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
     let over_base = format!("{} over {}:{}", group.how(), base.how(), base.setup.ranks);
     let ratios = [
         ("bytes per cell", group.how(), group.bytes_per_cell()),
-        ("load imbalance", group.how(), (group.setup.ranks > 1).then(|| group.imbalance())),
+        ("load imbalance", group.how(), group.imbalance().filter(|_| group.setup.ranks > 1)),
         ("speedup", &over_base, speedup),
         ("efficiency", &over_base, scales.then(|| groups.global_efficiency(group))),
     ];

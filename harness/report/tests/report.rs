@@ -202,6 +202,9 @@ fn two_programs_are_never_in_one_series() {
     lines.extend(record().iter().map(other));
     let place = tempfile::tempdir().unwrap();
     let written = report(place.path(), &lines).unwrap();
+    // Both report a time of their own.
+    let page = std::fs::read_to_string(&written.page).unwrap();
+    assert!(!page.contains("different clocks"), "{page}");
     // Figures over cells show both programs, all others one.
     assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4);
     let read = |name: &str| {
@@ -223,6 +226,98 @@ fn two_programs_are_never_in_one_series() {
     assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
     assert!(page.contains("other does not provide: MPI"), "{page}");
     assert!(page.matches("<td>other</td>").count() == page.matches("<td>mesher</td>").count());
+}
+
+/// A program that reports no time is timed from outside, which a figure that shows both must state.
+#[test]
+fn times_of_different_clocks_are_named() {
+    let mut lines = record();
+    let other = |line: &Line| {
+        let mut line = line.clone();
+        if let Entry::Run(run) = &mut line.entry {
+            run.setup.engine = "other".into();
+            run.time_wall_s = run.time_launch_s;
+        }
+        line
+    };
+    lines.extend(record().iter().map(other));
+    let place = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
+    let clocks = "Measured times are of different clocks: mesher: the program&#39;s own clock; other: the whole process";
+    // The figures of time over cells, time over layers and the rate, and the tables of experiments with measured runs.
+    let count = page.replace("&#39;", "'").matches(&clocks.replace("&#39;", "'")).count();
+    assert_eq!(count, 6, "{page}");
+}
+
+/// The model has steps just after powers of two.
+#[test]
+fn the_line_of_a_model_has_integer_ranks_and_those_of_all_runs() {
+    let all = [2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 256];
+    let meshes =
+        |ranks| [25_000_000, 50_000_000].map(|n| run("strong", Comm::Sim, ranks, n, 4, ""));
+    let runs = all.map(|ranks| meshes(ranks).concat());
+    let lines = [vec![session()], runs.concat()].concat();
+    let place = tempfile::tempdir().unwrap();
+    report(place.path(), &lines).unwrap();
+    let text = std::fs::read_to_string(place.path().join("figures/model-uav-50M.csv")).unwrap();
+    let line = text.lines().filter(|row| row.contains("model and its band"));
+    let ranks: Vec<f64> = line.map(|row| row.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(ranks.iter().all(|ranks| ranks.fract() == 0.0), "{text}");
+    assert!(all.iter().all(|of| ranks.contains(&(*of as f64))), "{text}");
+}
+
+#[test]
+fn figures_that_an_earlier_report_left_are_named() {
+    let place = tempfile::tempdir().unwrap();
+    let lines = record();
+    assert_eq!(
+        report(place.path(), &lines).unwrap().notes,
+        report(place.path(), &lines).unwrap().notes
+    );
+    let is_weak = |line: &Line| line.run().is_some_and(|run| run.setup.experiment == "weak");
+    let fewer: Vec<Line> = lines.into_iter().filter(|line| !is_weak(line)).collect();
+    let notes = report(place.path(), &fewer).unwrap().notes;
+    let named = "figures/ also has figures that are not of this report: efficiency-weak-uav.svg, phases-weak-uav.svg";
+    assert!(notes.iter().any(|note| note == named), "{notes:?}");
+    assert!(place.path().join("figures/phases-weak-uav.svg").is_file());
+}
+
+/// A measured point far above ideal, of which the factors are below 1, beside projected ones with computation scaling above 1.
+#[test]
+fn the_reason_of_a_speedup_is_that_of_its_own_point() {
+    let mut lines: Vec<Line> = Vec::new();
+    for (comm, ranks) in [(Comm::Sim, 1), (Comm::Sim, 4), (Comm::Mpi, 1), (Comm::Mpi, 4)] {
+        let mut of = run("strong", comm, ranks, 50_000_000, 4, "");
+        for line in &mut of {
+            let Entry::Run(run) = &mut line.entry else { panic!("a run") };
+            let factor = match (comm, ranks) {
+                (Comm::Sim, 1) => 3.0,
+                _ => 1.0,
+            };
+            run.useful_s =
+                Spread::of(&run.useful_s.by_rank.iter().map(|s| s * factor).collect::<Vec<_>>());
+            for phase in &mut run.phases {
+                phase.useful_s = Spread::of(
+                    &phase.useful_s.by_rank.iter().map(|s| s * factor).collect::<Vec<_>>(),
+                );
+            }
+            if (comm, ranks) == (Comm::Mpi, 1) {
+                (run.time_wall_s, run.time_launch_s) =
+                    (run.time_wall_s * 4.0, run.time_launch_s * 4.0);
+            }
+        }
+        lines.extend(of);
+    }
+    lines.insert(0, session());
+    let place = tempfile::tempdir().unwrap();
+    report(place.path(), &lines).unwrap();
+    let tex = std::fs::read_to_string(place.path().join("figures.tex")).unwrap();
+    for part in [
+        "Above ideal (projected on 4 ranks): Computation scaling is above 1",
+        "Above ideal (oversubscribed on 4 ranks): A speedup per rank above 1 means",
+    ] {
+        assert!(tex.contains(part), "{part} is missing in {tex}");
+    }
 }
 
 /// Number of figures of the record of one program.

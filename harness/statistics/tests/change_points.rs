@@ -153,6 +153,17 @@ fn an_exact_counter_needs_few_values_after_the_change() {
     assert_eq!(places(&values), [30]);
 }
 
+/// A level of 2000 that never repeats a value, after one of 1000 that always does.
+#[test]
+fn an_exact_counter_that_becomes_inexact_has_a_step() {
+    for [old, new] in [[100, 40], [30, 25], [30, 5]] {
+        let values: Vec<f64> = (0..old + new)
+            .map(|i| if i < old { 1e3 } else { 2e3 + 3.0 * (i - old) as f64 })
+            .collect();
+        assert_eq!(places(&values), [old], "{new} new values");
+    }
+}
+
 #[test]
 fn short_and_degenerate_series_have_no_changes() {
     for values in [&[][..], &[1.0], &[1.0, 2.0, 3.0], &[5.0; 50], &[0.0; 20], &[f64::NAN; 9]] {

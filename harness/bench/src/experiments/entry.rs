@@ -366,7 +366,7 @@ pub struct Run {
     pub time_cpu_s: f64,
     /// Peak resident memory per rank, or of the whole process if ranks are simulated.
     pub peak_rss_bytes: Spread,
-    /// CPU time outside calls to other ranks, over all phases.
+    /// CPU time outside calls to other ranks, over all phases; unknown without phases, of which older records have the wall time.
     pub useful_s: Spread,
     /// Phase by phase, in order.
     pub phases: Vec<Phase>,

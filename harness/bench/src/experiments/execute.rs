@@ -81,7 +81,7 @@ impl Runner<'_> {
             time_launch_s: finished.time_wall_s,
             time_cpu_s: finished.time_cpu_s,
             peak_rss_bytes: spread(&report.peak_rss_bytes),
-            useful_s: Spread::of(&useful_s(setup.ranks, phases, time_wall_s)),
+            useful_s: useful_s(setup.ranks, phases),
             phases: phases.iter().map(phase).collect(),
             counters: counters.collect(),
             digest: report.digest.unwrap_or_default(),
@@ -145,13 +145,12 @@ fn layout(setup: &Setup) -> Layout {
     Layout { partitioner, weights, level_base, ..Layout::on(ranks) }
 }
 
-/// CPU time outside calls to other ranks, per rank; the wall time if there are no phases.
-fn useful_s(ranks: usize, phases: &[PhaseReport], time_wall_s: f64) -> Vec<f64> {
-    if phases.is_empty() {
-        return vec![time_wall_s; ranks];
-    }
+/// CPU time outside calls to other ranks, per rank; that of no rank if there are no phases.
+fn useful_s(ranks: usize, phases: &[PhaseReport]) -> Spread {
     let times: Vec<Vec<f64>> = phases.iter().map(PhaseReport::time_useful_s).collect();
-    (0..ranks).map(|rank| times.iter().map(|of| of[rank]).sum()).collect()
+    let ranks = if times.is_empty() { 0 } else { ranks };
+    let of_rank = |rank| times.iter().map(|of| of[rank]).sum();
+    Spread::of(&(0..ranks).map(of_rank).collect::<Vec<f64>>())
 }
 
 fn phase(phase: &PhaseReport) -> Phase {
@@ -253,10 +252,10 @@ mod tests {
     }
 
     #[test]
-    fn the_useful_time_of_a_program_without_phases_is_its_wall_time() {
+    fn the_useful_time_of_a_program_without_phases_is_unknown() {
         let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
-        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.005, 9.0));
+        assert_eq!((run.useful_s, run.peak_rss_bytes.sum), (Spread::default(), 9.0));
     }
 
     #[test]
@@ -282,7 +281,7 @@ mod tests {
             ("scripted", 8, "ab")
         );
         assert!(run.time_wall_s >= 0.05 && run.time_wall_s == run.time_launch_s);
-        assert!(run.peak_rss_bytes.sum > 1e5 && run.useful_s.sum > 0.0);
+        assert!(run.peak_rss_bytes.sum > 1e5);
         assert!(run.command.starts_with("sh engine.sh case.toml"), "{}", run.command);
     }
 
@@ -303,7 +302,10 @@ mod tests {
             format!("echo '{json}' > $2")
         };
         let run = scripted(&report("time_wall_s"), REPORTS, Comm::Solo).unwrap();
-        assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![0.0075], ""));
+        assert_eq!(
+            (run.time_wall_s, run.useful_s.by_rank.len(), run.digest.as_str()),
+            (0.0075, 0, "")
+        );
         assert!(run.phases.is_empty());
         let of_rank_0 = scripted(&report("time_cpu_s"), REPORTS, Comm::Sim);
         assert!(of_rank_0.unwrap_err().contains("no phases"));

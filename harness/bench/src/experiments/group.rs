@@ -47,10 +47,6 @@ impl Group {
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
             typical.time_wall_s = time_s.value;
-            if typical.phases.is_empty() {
-                // Then the useful time of every rank is the wall time.
-                typical.useful_s = Spread::exact(&vec![time_s.value; setup.ranks]);
-            }
         } else if by_rank {
             time_s.value = pop::time_s(&typical, &network);
             time_s.low = time_s.low.min(time_s.value);
@@ -80,20 +76,22 @@ impl Group {
         self.median_of(|run| Some(peak(run)? / run.cells.max(1) as f64))
     }
 
-    /// Returns the load imbalance of useful time, max / mean. The interval of the repetitions is extended to that of the typical run.
-    pub fn imbalance(&self) -> Median {
-        let of = |run: &Run| run.useful_s.lambda(run.setup.ranks).max(1.0);
-        let repeated = self.median_of(|run| Some(of(run))).expect("a group has runs");
-        let value = of(&self.typical);
+    /// Returns the load imbalance of useful time, max / mean; `None` if that is unknown in a run. The interval of the repetitions is extended
+    /// to that of the typical run.
+    pub fn imbalance(&self) -> Option<Median> {
+        let repeated = self.median_of(pop::imbalance)?;
+        let value = pop::imbalance(&self.typical)?;
         let (low, high) = (repeated.low.min(value), repeated.high.max(value));
-        Median { value, low, high, ..repeated }
+        Some(Median { value, low, high, ..repeated })
     }
 
     /// Returns the CPU time of the whole process, in seconds; `None` if it is unknown in a run.
     pub fn cpu_s(&self) -> Option<Median> {
-        // A launcher such as srun has its own, as ranks are not its children. Without phases, useful time is wall time.
-        let is_wall = self.setup.comm == Comm::Solo && self.typical.phases.is_empty();
-        let is_of_ranks = |run: &Run| is_wall || run.time_cpu_s > 0.9 * run.useful_s.sum;
+        // A launcher such as srun has its own, as ranks are not its children. Ranks without phases are taken to be busy all the time.
+        let is_alone = self.setup.comm == Comm::Solo && self.typical.phases.is_empty();
+        let all_s = |run: &Run| run.time_wall_s * self.setup.ranks as f64;
+        let busy_s = |run: &Run| if run.phases.is_empty() { all_s(run) } else { run.useful_s.sum };
+        let is_of_ranks = |run: &Run| is_alone || run.time_cpu_s > 0.9 * busy_s(run);
         self.median_of(|run| is_of_ranks(run).then_some(run.time_cpu_s))
     }
 
@@ -118,9 +116,16 @@ impl Group {
         format!("{} on {} rank{s}", self.how(), self.setup.ranks)
     }
 
-    /// Returns the efficiencies of the typical run relative to that of `reference`.
-    pub fn efficiency(&self, reference: &Group) -> Efficiency {
+    /// Returns the efficiencies of the typical run relative to that of `reference`; `None` if one has no useful times.
+    pub fn efficiency(&self, reference: &Group) -> Option<Efficiency> {
         pop::efficiency(&self.typical, &reference.typical, &self.network)
+    }
+
+    /// Returns the global efficiency relative to `reference`: by times alone, if one has no useful times.
+    pub fn global_efficiency(&self, reference: &Self) -> f64 {
+        let per_cell = |of: &Self| of.time_s.value * of.setup.ranks as f64 / of.cells() as f64;
+        let by_times = || per_cell(reference) / per_cell(self);
+        self.efficiency(reference).map_or_else(by_times, |of| of.global())
     }
 }
 
@@ -283,7 +288,7 @@ impl Groups {
 
     /// Returns the efficiency of a group.
     pub fn global_efficiency(&self, group: &Group) -> Median {
-        self.of_times(group, self.efficiency(group).global())
+        self.of_times(group, group.global_efficiency(self.reference(group)))
     }
 
     /// Returns a value that is proportional to the time of a group's reference over that of the group. It is in its interval if both times are in
@@ -305,8 +310,8 @@ impl Groups {
         group.setup.ranks == 1 || self.reference(group).setup.ranks < group.setup.ranks
     }
 
-    /// Returns the efficiencies of a group relative to its reference.
-    pub fn efficiency(&self, group: &Group) -> Efficiency {
+    /// Returns the efficiencies of a group relative to its reference; `None` if one has no useful times.
+    pub fn efficiency(&self, group: &Group) -> Option<Efficiency> {
         group.efficiency(self.reference(group))
     }
 

@@ -17,6 +17,8 @@
 //! therefore the median over the repetitions (see [`Group`](super::group::Group)), taken before any maximum over ranks: the
 //! maximum of many noisy times would select the most disturbed rank.
 //!
+//! Of a program that reports no phases, useful times are unknown, and so are all factors.
+//!
 //! C is the time on an ideal network, as ranks wait for each other at the end of a phase. For simulated ranks T is projected:
 //! C plus the cost of the counted messages in a latency-bandwidth model.
 
@@ -70,6 +72,9 @@ impl Efficiency {
     }
 }
 
+/// Why times, and no factor, are those of an efficiency above 1.
+pub const DISTURBED: &str = "A speedup per rank above 1 means that the base case was disturbed, or that its cells took more CPU time where \
+     that is unknown.";
 /// Efficiencies up to this are 1.
 pub(crate) const ABOVE_ONE: f64 = 1.005;
 /// Factors up to this are shown as 1.
@@ -101,8 +106,19 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
     }
 }
 
-/// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
-pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
+/// Why factors are left out, as the end of a sentence.
+pub const UNKNOWN: &str = "the program reports no phases with the CPU times of all ranks";
+
+/// Returns max / mean of the useful times; `None` if they are unknown.
+pub fn imbalance(run: &Run) -> Option<f64> {
+    (!run.phases.is_empty()).then(|| run.useful_s.lambda(run.setup.ranks).max(1.0))
+}
+
+/// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks; `None` if useful times of one are
+/// unknown.
+pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Option<Efficiency> {
+    // Without phases, useful times are unknown.
+    run.phases.first().and(reference.phases.first())?;
     let (time_s, path_s) = (time_s(run, network), run.path_s());
     let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {
@@ -116,7 +132,7 @@ pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     efficiency.check_invariants([run.useful_s.max, path_s].map(off));
     let [load_balance, serialisation] =
         [efficiency.load_balance, efficiency.serialisation].map(|factor| factor.min(1.0));
-    Efficiency { load_balance, serialisation, ..efficiency }
+    Some(Efficiency { load_balance, serialisation, ..efficiency })
 }
 
 fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
@@ -156,7 +172,9 @@ type Weight<'a> = &'a dyn Fn(&Phase) -> f64;
 
 /// Returns the sentence for a run relative to its reference run, with the reason for an efficiency above 1.
 pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
-    let e = efficiency(run, reference, network);
+    let Some(e) = efficiency(run, reference, network) else {
+        return format!("no efficiencies at {} ranks: {UNKNOWN}", run.setup.ranks);
+    };
     let (ranks, percent) = (run.setup.ranks, 100.0 * e.global());
     // Its own base has a computation scaling of 1.
     let of = if reference.setup == run.setup { "parallel" } else { "global" };
@@ -181,7 +199,7 @@ pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
     let phase = run.phases.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)));
     let why = match phase {
         _ if factor > 1.0 - LOSS_MIN => "no single cause costs more than 3 %".to_owned(),
-        None => "the program reports no phases".to_owned(),
+        None => UNKNOWN.to_owned(),
         Some(Phase { name, useful_s, .. }) => {
             let (percent, lambda) = (100.0 * (1.0 - factor), useful_s.lambda(ranks));
             let rank = useful_s.at;
@@ -212,6 +230,10 @@ mod tests {
     use proptest::prelude::*;
 
     const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, ..ASSUMED };
+
+    fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
+        super::efficiency(run, reference, network).unwrap()
+    }
 
     fn close(a: f64, b: f64) {
         assert!((a - b).abs() < 1e-9, "{a} is not {b}");
@@ -300,12 +322,13 @@ mod tests {
     }
 
     #[test]
-    fn a_program_without_phases_has_no_communication_loss() {
+    fn the_factors_of_a_program_without_phases_are_unknown() {
         let mut without_phases = run(Comm::Solo, 100, &[("all", &[3.0])]);
         without_phases.phases.clear();
-        let e = efficiency(&without_phases, &without_phases.clone(), &FREE);
-        close(e.serialisation * e.transfer, 1.0);
-        close(e.global(), 1.0);
+        assert_eq!(super::efficiency(&without_phases, &without_phases, &FREE), None);
+        assert_eq!(imbalance(&without_phases), None);
+        let cause = cause(&without_phases, &without_phases, &FREE);
+        assert!(cause.ends_with(UNKNOWN), "{cause}");
         without_phases.setup.comm = Comm::Sim;
         close(time_s(&without_phases, &FREE), 3.0);
     }

@@ -8,6 +8,7 @@ use super::rules::{GateCase, Tolerance};
 use super::subject::Counted;
 use crate::emptied;
 use check::promises::Independence;
+use contract::number::grouped;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions, SERIAL};
 use run::engine::process::{self, Watch};
@@ -120,6 +121,10 @@ fn compare(
         let why = format!("other facets were read: their digest is {other}, and was {one}");
         return vec![noted("geometry", Verdict::Missing, why)];
     }
+    let meshes = [old, new].map(|of| (of.digest.as_deref(), of.exact.get(CELLS).copied()));
+    if let Some(why) = other_mesh(meshes) {
+        return vec![noted("digest", Verdict::Missing, why)];
+    }
     let mesh = (layer == LayerName::Counters).then(|| same_mesh(case, [&old.digest, &new.digest]));
     let mut findings: Vec<GateFinding> = mesh.flatten().into_iter().collect();
     let [old, new] = [old, new].map(|of| of.of_layer(layer));
@@ -142,12 +147,26 @@ fn compare(
     findings
 }
 
-/// A different digest means a different mesh; the layer of correctness decides whether it is correct. `None` if neither side has one.
+/// The digest and the number of cells of a mesh, as far as they are known.
+pub(super) type Mesh<'a> = (Option<&'a str>, Option<u64>);
+
+/// Why numbers of two programs are not comparable: their meshes have different digests, or different numbers of cells and not both a digest.
+/// The layer of correctness decides which of them is correct.
+pub(super) fn other_mesh([old, new]: [Mesh; 2]) -> Option<String> {
+    let (what, old, new) = match (old, new) {
+        ((Some(old), _), (Some(new), _)) => ("digest", old.to_owned(), new.to_owned()),
+        ((_, Some(old @ 1..)), (_, Some(new @ 1..))) => ("cells", grouped(old), grouped(new)),
+        _ => return None,
+    };
+    let why = "the mesh is another one, so that its numbers are not comparable";
+    (old != new).then(|| format!("{why}: {what} {new}, and {old} in the baseline"))
+}
+
+/// The finding on a digest that is the same if both sides have one. `None` if neither has.
 fn same_mesh(case: &str, digests: [&Option<String>; 2]) -> Option<GateFinding> {
     let (verdict, note) = match digests {
         [None, None] => return None,
-        [Some(old), Some(new)] if old == new => (Verdict::Unchanged, new.clone()),
-        [Some(old), Some(new)] => (Verdict::Changed, format!("different mesh: {new} was {old}")),
+        [Some(_), Some(new)] => (Verdict::Unchanged, new.clone()),
         [Some(old), None] => (Verdict::Missing, gone(old)),
         [None, Some(new)] => (Verdict::Changed, format!("new, {new}")),
     };
@@ -251,12 +270,15 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.timeout, &place));
-    // A program that fails without valgrind, too, states the cause.
+    // A program that fails without valgrind, too, states the cause; else it reports of which mesh the count is.
     let options = RunOptions::new(&place, bench.options.timeout);
-    counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
+    let report = engine.run(&path, &SERIAL, &options)?.report;
+    counted?;
     match counted_by_all(&place) {
         Ok(0) => Err(engine.unusable("has no profile with costs by valgrind".to_owned())),
         Ok(count) => Ok(CaseMeasures {
+            digest: report.digest,
+            exact: [(CELLS.to_owned(), report.cells)].into(),
             counted: [(INSTRUCTIONS.to_owned(), count)].into(),
             ..CaseMeasures::default()
         }),
@@ -305,14 +327,14 @@ mod tests {
 
     #[test]
     fn every_change_is_shown_and_only_growth_and_loss_fail() {
-        let mut old = numbers(&[("cells", 8), ("rays", 6), ("4 ranks/messages", 10)]);
+        let mut old = numbers(&[("cells", 9), ("rays", 6), ("4 ranks/messages", 10)]);
         old.extend(numbers(&[("8 ranks/messages", 12), ("by/phase", 3), ("words", 5)]));
         let new = numbers(&[("cells", 9), ("rays", 5), ("4 ranks/messages", 11), ("hops", 1)]);
         let expected = [
             ("4 ranks/messages", Verdict::Changed),
             ("8 ranks/messages", Verdict::Missing),
             ("by/phase", Verdict::Missing),
-            ("cells", Verdict::Changed),
+            ("cells", Verdict::Unchanged),
             ("hops", Verdict::Changed),
             ("rays", Verdict::Improvement),
             ("words", Verdict::Missing),
@@ -321,6 +343,33 @@ mod tests {
         assert_eq!(found, expected.map(|(name, verdict)| (name.to_owned(), verdict)));
         let grown = verdicts(LayerName::Counters, &old, &numbers(&[("rays", 7)]));
         assert!(grown.contains(&("rays".to_owned(), Verdict::Regression)));
+    }
+
+    #[test]
+    fn numbers_of_another_mesh_are_not_comparable() {
+        let of = |digest: Option<&str>, cells| CaseMeasures {
+            digest: digest.map(str::to_owned),
+            exact: numbers(&[("cells", cells), ("words", cells)]),
+            memory: numbers(&[(MEMORY, cells << 20)]),
+            counted: numbers(&[(INSTRUCTIONS, cells)]),
+            ..CaseMeasures::default()
+        };
+        for (old, new, holds) in [
+            (of(Some("a"), 80), of(Some("b"), 40), false),
+            (of(Some("a"), 80), of(Some("b"), 80), false),
+            (of(None, 80), of(Some("b"), 40), false),
+            (of(None, 80), of(None, 40), false),
+            (of(Some("a"), 80), of(Some("a"), 80), true),
+            (of(None, 80), of(Some("b"), 80), true),
+            (of(None, 0), of(None, 40), true),
+        ] {
+            for layer in [LayerName::Counters, LayerName::Memory, LayerName::Instructions] {
+                let found = compare("c", layer, [&old, &new], &Tolerance::default());
+                let is_missing = found.iter().all(|finding| finding.verdict == Verdict::Missing);
+                assert_eq!(is_missing, !holds, "{layer}: {found:?}");
+                assert!(holds || found[0].note.contains("the mesh is another one"), "{found:?}");
+            }
+        }
     }
 
     #[test]

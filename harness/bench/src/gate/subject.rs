@@ -4,7 +4,8 @@
 //! kept whole, because a program may need libraries or data beside it, and are used where they were built. The repository, its
 //! index and its working tree stay unchanged.
 //!
-//! Invariant: a directory that contains the file `built` has the result of the build command in that file, by the compiler in it.
+//! Invariant: a directory that contains the file `built` has the result of the build command in that file, by the compiler and with the
+//! environment in it.
 
 use super::GateOptions;
 use super::measures::{CaseMeasures, Measured, WORKING_TREE};
@@ -13,11 +14,13 @@ use crate::git;
 use contract::failure::{Failure, Result};
 use run::engine::description::Build;
 use run::engine::failure::Failure as Ended;
+use run::engine::paths::on_path;
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use run::engine::templates::{Values, fill};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::env;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -119,7 +122,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    let (done, with) = (place.join("built"), build.command.join("\n") + "\n" + &compiler());
+    let (done, with) = (place.join("built"), build.command.join("\n") + "\n" + &environment());
     let mut label = "the working tree";
     if let Some(revision) = revision {
         let is_built = fs::read_to_string(&done).is_ok_and(|of| of == with);
@@ -147,6 +150,18 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     Failure::unless(program.is_file(), why)?;
     fs::write(&done, with).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
+}
+
+/// What the result of a build depends on beside its sources and its command: the compiler, the variables of Cargo and of compilers, and
+/// where MPI is.
+fn environment() -> String {
+    let is_of_build = |name: &str| {
+        let is_of_tool = name.starts_with("CARGO_") || name.starts_with("RUST");
+        is_of_tool || name.ends_with("FLAGS") || ["CC", "CXX", "AR", "LD"].contains(&name)
+    };
+    let all = env::vars_os().filter(|(name, _)| name.to_str().is_some_and(is_of_build));
+    let variables: BTreeSet<String> = all.map(|of| format!("{of:?}")).collect();
+    format!("{}\nmpicc: {:?}\n{variables:?}", compiler(), on_path("mpicc"))
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

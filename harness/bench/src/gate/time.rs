@@ -9,11 +9,12 @@
 
 use super::Bench;
 use super::measures::LayerName;
-use super::numbers::prefix;
+use super::numbers::{other_mesh, prefix};
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{GateCase, TimeRules};
 use crate::emptied;
 use run::engine::failure::Failure;
+use run::engine::interrupt;
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use statistics::comparison::{Comparison, Round, adjusted, compare, trimmed_mean};
 use statistics::random::Random;
@@ -67,10 +68,8 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
             Ok(times) => {
                 layer.findings.extend(times.iter().map(|of| of.finding(&case.name, rules)))
             }
-            Err((_, why)) if why.is_interrupt() => {}
-            Err((verdict, why)) => {
-                let who = if verdict == Verdict::Missing { "baseline" } else { "candidate" };
-                let note = format!("the {who} has no result: {why}");
+            Err(_) if interrupt::requested() => {}
+            Err((verdict, note)) => {
                 let metric = format!("{}time", prefix(ranks));
                 layer.findings.push(GateFinding::noted(&case.name, &metric, verdict, note));
             }
@@ -78,25 +77,30 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
     }
 }
 
-/// The CPU times and the wall times of a case, or why it has none, with the verdict on that: the baseline fails, or the candidate alone.
-type Times = Result<Vec<Quantity>, (Verdict, Failure)>;
+/// The CPU times and the wall times of a case, or why it has none, with the verdict on that: the baseline fails, the candidate alone, or
+/// their meshes differ.
+type Times = Result<Vec<Quantity>, (Verdict, String)>;
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
 fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
     let baseline = &bench.baseline.as_ref().expect("times are compared with a baseline").engine;
-    let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
+    let failed = |index, why: Failure| match index {
+        CANDIDATE => (Verdict::Regression, format!("the candidate has no result: {why}")),
+        _ => (Verdict::Missing, format!("the baseline has no result: {why}")),
+    };
+    let path = bench.prepare(baseline, case, "time").map_err(|why| failed(0, why))?;
     let run = |index: usize| {
-        let (engine, verdict) = match index {
-            CANDIDATE => (&bench.candidate.engine, Verdict::Regression),
-            _ => (baseline, Verdict::Missing),
-        };
-        let place = emptied(bench.place.join("time/run"), engine).map_err(|why| (verdict, why))?;
+        let engine = if index == CANDIDATE { &bench.candidate.engine } else { baseline };
+        let place = emptied(bench.place.join("time/run"), engine);
+        let place = place.map_err(|why| failed(index, why))?;
         let options = RunOptions::new(&place, bench.options.timeout);
-        let completed = engine.run(&path, &Layout::on(ranks), &options);
-        completed.map(|run| run.finished).map_err(|why| (verdict, why))
+        engine.run(&path, &Layout::on(ranks), &options).map_err(|why| failed(index, why))
     };
     // The first run reads program and geometry from disk and is not counted.
-    let (first, also) = (run(0)?, run(CANDIDATE)?);
+    let runs = [run(0)?, run(CANDIDATE)?];
+    let meshes = runs.each_ref().map(|of| (of.report.digest.as_deref(), Some(of.report.cells)));
+    other_mesh(meshes).map_or(Ok(()), |why| Err((Verdict::Missing, why)))?;
+    let [first, also] = runs.map(|run| run.finished);
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget.as_secs_f64());
     let fit = budget_s / (2.0 * first.time_wall_s + also.time_wall_s).max(1e-6);
@@ -108,7 +112,7 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
         let mut order = [0, 1, 2];
         random.shuffle(&mut order);
         for index in order {
-            let run = run(index)?;
+            let run = run(index)?.finished;
             // A microsecond is the resolution of the clocks.
             cpu[round][index] = run.time_cpu_s.max(1e-6).ln();
             wall[round][index] = run.time_wall_s.max(1e-6).ln();

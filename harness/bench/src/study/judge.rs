@@ -7,7 +7,7 @@ use super::file::{Row, Study};
 use super::measure::Sample;
 use crate::experiments::entry::{Entry, Line, Network, NoResult, Run, Setup};
 use crate::experiments::group::{Group, Groups};
-use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
+use crate::experiments::pop::{ABOVE_ONE, DISTURBED, Efficiency, above_one};
 use crate::name_of;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -119,15 +119,17 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     };
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
-    let efficiencies = runs.iter().map(|run| run.efficiency(against));
+    let efficiencies = runs.iter().filter_map(|run| run.efficiency(against));
     let efficiencies: Vec<Efficiency> =
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
-    let why = above_one(&efficiencies).unwrap_or_default();
     // The least trustworthy run counts.
     let ranking = ["serial", "measured", "oversubscribed", "projected"];
     let rank = |how: &&str| ranking.iter().position(|h| h == how);
     let how = runs.iter().chain([&against]).map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
+    let is_above = row.measure.is_efficiency() && value > ABOVE_ONE;
+    let disturbed = is_above.then(|| DISTURBED.to_owned());
+    let why = above_one(&efficiencies).or(disturbed).unwrap_or_default();
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
 }
 

@@ -89,13 +89,16 @@ pub static MEASURES: [Measure; 15] = [
         Ok(lambda_cells(s.run())? / lambda_cells(s.against)?)
     }),
     measure("lambda_cpu", Alone, PLAIN, |s| {
-        Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
+        pop::imbalance(&s.run().typical).ok_or(pop::UNKNOWN.to_owned())
     }),
     measure("efficiency", Against, PLAIN, |s| match s.against.setup.ranks {
-        1 => Ok(s.run().efficiency(s.against).global()),
+        1 => Ok(s.run().global_efficiency(s.against)),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
-    measure("parallel_efficiency", Alone, PLAIN, |s| Ok(s.run().efficiency(s.run()).parallel())),
+    measure("parallel_efficiency", Alone, PLAIN, |s| {
+        let parallel = s.run().efficiency(s.run()).map(|e| e.parallel());
+        parallel.ok_or(pop::UNKNOWN.to_owned())
+    }),
     measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];
 
@@ -253,6 +256,21 @@ mod tests {
         assert_eq!(of(&[8.0, 2.0, 3.0]), 1.5);
         // A slow rise accumulates.
         assert!((of(&[1.0, 1.04, 1.08]) - 1.08).abs() < 1e-9);
+    }
+
+    #[test]
+    fn useful_times_that_nobody_reports_meet_no_target() {
+        let without_phases = |times: &[f64]| {
+            let mut run = run(Comm::Mpi, 100, &[("a", times)]);
+            (run.phases, run.useful_s) = (Vec::new(), Spread::default());
+            group(run)
+        };
+        let (one, two) = (without_phases(&[3.0]), without_phases(&[2.0, 2.0]));
+        for name in ["lambda_cpu", "parallel_efficiency"] {
+            assert!(value(name, &[&two], None).unwrap_err().contains("no phases"), "{name}");
+        }
+        assert_eq!(value("efficiency", &[&two], Some(&one)), Ok(0.75));
+        assert_eq!(value("speed_up", &[&two], Some(&one)), Ok(1.5));
     }
 
     #[test]

@@ -14,8 +14,8 @@ pub mod history;
 use crate::gate::report::change_percent;
 use history::Record;
 use serde::Serialize;
-pub use statistics::change_points::VALUES_MIN;
 use statistics::change_points::{Change as Step, change_points};
+pub use statistics::change_points::{LEVEL_MIN, VALUES_MIN};
 use statistics::comparison::adjusted;
 use std::collections::BTreeSet;
 
@@ -110,6 +110,11 @@ impl Series {
         Some(if is_gain(&self.name)? { new < old } else { new > old })
     }
 
+    /// Whether a step is so near to the commit of a record that accepting this commit may excuse it.
+    pub fn has_step_near(&self, commit: usize) -> bool {
+        self.changes.iter().any(|change| distance(&self.points, change.step.at, commit).is_some())
+    }
+
     /// Returns the last change for the worse that was not accepted, whose first new value is among the last `recent`, and since which the
     /// metric has not become as good as before.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
@@ -176,21 +181,23 @@ pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
     all.into_iter().map(of_discovery).collect()
 }
 
+/// The distance of a commit from those between the last old value of a step and its first new one; `None` if it is not near.
+fn distance(points: &[(usize, f64)], at: usize, commit: usize) -> Option<usize> {
+    let [values, commits] = ACCEPTED_WITHIN;
+    let first = points[(at - 1).saturating_sub(values)].0 + 1;
+    let last = points[(at + values).min(points.len() - 1)].0;
+    let [from, until] = [points[at - 1].0 + 1, points[at].0];
+    let off = from.saturating_sub(commit).max(commit.saturating_sub(until));
+    (off <= commits && (first..=last).contains(&commit)).then_some(off)
+}
+
 /// Returns of every step whether it was accepted. A commit that was accepted excuses one step, the nearest.
 fn are_accepted(found: &[Step], points: &[(usize, f64)], records: &[Record]) -> Vec<bool> {
-    let [values, commits] = ACCEPTED_WITHIN;
-    // The distance of a commit from those between the last old value and the first new one; `None` if it is not near.
-    let off = |at: usize, commit: usize| {
-        let first = points[(at - 1).saturating_sub(values)].0 + 1;
-        let last = points[(at + values).min(points.len() - 1)].0;
-        let [from, until] = [points[at - 1].0 + 1, points[at].0];
-        let off = from.saturating_sub(commit).max(commit.saturating_sub(until));
-        (off <= commits && (first..=last).contains(&commit)).then_some(off)
-    };
     let mut all = vec![false; found.len()];
     for commit in (0..records.len()).filter(|i| records[*i].accepted) {
-        let near = found.iter().zip(0..).filter_map(|(step, i)| Some((off(step.at, commit)?, i)));
-        near.min().into_iter().for_each(|(_, i): (usize, usize)| all[i] = true);
+        let off = |(step, i): (&Step, usize)| Some((distance(points, step.at, commit)?, i));
+        let near = found.iter().zip(0..).filter_map(off).min();
+        near.into_iter().for_each(|(_, i)| all[i] = true);
     }
     all
 }

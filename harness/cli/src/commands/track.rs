@@ -5,7 +5,7 @@ use crate::output::put_forms;
 use bench::experiments::machine;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
-use bench::track::{Series, VALUES_MIN, analyse};
+use bench::track::{LEVEL_MIN, Series, VALUES_MIN, analyse};
 use clap::{ArgGroup, Args};
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use report::pretty;
@@ -25,7 +25,8 @@ pub struct Arguments {
     /// Also append this value; may be repeated
     #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number, group = "appended")]
     value: Vec<(String, f64)>,
-    /// The commit of the appended values [default: that of the file, or HEAD; none for a working tree with changes]
+    /// The commit of the appended values [default: that of the file, or HEAD; none for a working tree with changes to files of git, but for
+    /// the history]
     #[arg(long, value_name = "REVISION", requires = "appended")]
     commit: Option<String>,
     /// Accept the change of every metric at this commit of the history, or the nearest within two values and ten commits, so that it no
@@ -47,9 +48,10 @@ pub struct Arguments {
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    fail_recent: usize,
+    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again: at least 5,
+    /// and rather 8
+    #[arg(long, value_name = "N", value_parser = recent)]
+    fail_recent: Option<usize>,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
     #[arg(long, default_value_t = 0.01, value_parser = number_in(1e-6..=1.0))]
     alpha: f64,
@@ -62,6 +64,13 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
         (!case.is_empty() && !metric.is_empty()).then(|| (name.to_owned(), number))
     });
     parsed.ok_or_else(|| "give CASE/METRIC=NUMBER".to_owned())
+}
+
+/// Parses a number of last values.
+fn recent(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number >= LEVEL_MIN);
+    let why = "with fewer, most steps of a metric with noise are never seen";
+    number.ok_or_else(|| format!("give at least {LEVEL_MIN}: {why}"))
 }
 
 /// Appends, analyses, prints and writes; returns the exit code.
@@ -99,7 +108,13 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             "in {few} metrics no step can be found yet: they have fewer than {VALUES_MIN} values"
         );
     }
-    let recent = arguments.fail_recent;
+    for commit in &arguments.accept {
+        let at = records.iter().position(|record| record.commit.starts_with(commit));
+        if !all.iter().any(|series| at.is_some_and(|at| series.has_step_near(at))) {
+            println!("accepted without effect: no metric has a step near {commit}");
+        }
+    }
+    let recent = arguments.fail_recent.unwrap_or(0);
     let is_worse = |series: &&Series| series.worse_recently(recent).is_some();
     let worse: Vec<&str> = all.iter().filter(is_worse).map(|series| &*series.name).collect();
     if !worse.is_empty() {
@@ -132,7 +147,7 @@ fn append(arguments: &Arguments) -> Result<()> {
     let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
     if records.is_empty() {
         let machine = machine::describe(&Paths::find().mpirun, repository).label();
-        let of_commit = Record::of_commit(commit.unwrap_or("HEAD"), repository)?;
+        let of_commit = Record::of_values(commit, &arguments.history, repository)?;
         records.push(Record { machine, ..of_commit });
     }
     for (name, value) in &arguments.value {
@@ -141,8 +156,10 @@ fn append(arguments: &Arguments) -> Result<()> {
     }
     // It would make the history unreadable.
     records.iter().try_for_each(Record::check).map_err(Failure::input)?;
-    records
-        .iter()
-        .try_for_each(|record| jsonl::append(&arguments.history, record))
-        .map_err(|error| Failure::at(&arguments.history, error))
+    for record in &records {
+        let appended = jsonl::append(&arguments.history, record);
+        appended.map_err(|error| Failure::at(&arguments.history, error))?;
+        println!("appended to commit {:.12}: {}", record.commit, record.subject);
+    }
+    Ok(())
 }

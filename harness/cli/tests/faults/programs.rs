@@ -190,7 +190,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
     let gate = format!(
         "gate --rules gate.toml --layers counters --record r.json --junit g.xml --json g.json --markdown g.md --baseline {mesher} --mesher {mesher}"
     );
-    let track = "track history.jsonl --value case/x=3 --repository";
+    let track = "track history.jsonl --value case/x=3 --commit HEAD --repository";
     let repository = env!("CARGO_MANIFEST_DIR");
     let mut all = vec![
         Program { varying: &["run.json"], ..new("mesher", Mesher, mesh, &["out", "run.json"]) },

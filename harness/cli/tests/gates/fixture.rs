@@ -123,11 +123,17 @@ impl Fixture {
 
     /// Runs the harness in the directory.
     pub fn harness(&self, arguments: &str) -> Outcome {
+        self.harness_with(arguments, "HARNESS_ROOT", &self.path("").to_string_lossy())
+    }
+
+    /// Runs the harness in the directory, with a variable.
+    pub fn harness_with(&self, arguments: &str, name: &str, value: &str) -> Outcome {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
         command
             .args(arguments.split(' '))
             .current_dir(self.0.path())
-            .env("HARNESS_ROOT", self.0.path());
+            .env("HARNESS_ROOT", self.0.path())
+            .env(name, value);
         command.env_remove("GITHUB_STEP_SUMMARY");
         let output = command.output().unwrap();
         let printed =

@@ -101,6 +101,21 @@ fn a_program_without_times_is_named() {
 }
 
 #[test]
+fn times_of_different_meshes_are_not_compared() {
+    let fixture = Fixture::new();
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"time\"]\n");
+    let script = fs::read_to_string(fixture.path("engine")).unwrap();
+    fixture.program("other", &script.replace("mesh=right cells=1", "mesh=wrong cells=8"));
+    let gate =
+        "gate --engine engine.toml --rules gate.toml --layers time --budget 1 --baseline engine";
+    let outcome = fixture.harness(&format!("{gate} --candidate other"));
+    let why = "the mesh is another one, so that its numbers are not comparable: digest ";
+    assert!(outcome.code == 3 && outcome.printed.contains(why), "{}", outcome.printed);
+    let same = fixture.harness(&format!("{gate} --candidate engine"));
+    assert_ne!(same.code, 3, "{}", same.printed);
+}
+
+#[test]
 fn a_baseline_without_a_mesh_has_no_correctness_to_compare_with() {
     let fixture = Fixture::new();
     let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
@@ -265,6 +280,11 @@ fn tracked_commits_form_a_history_with_a_change_point() {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
     }
     // Options that would have no effect, and an address that is the same for all commits.
+    for few in [1, 4] {
+        let refused = fixture.harness(&format!("track history.jsonl --fail-recent {few}"));
+        let why = "give at least 5: with fewer";
+        assert!(refused.code == 2 && refused.printed.contains(why), "{}", refused.printed);
+    }
     for unused in ["--commit HEAD", "--repository .", "--link x/{commit}", "--page p --link x"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl {unused}")).code, 2, "{unused}");
     }
@@ -280,6 +300,24 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert_eq!(accepted.code, 0, "{}", accepted.printed);
     assert!(accepted.printed.contains(", accepted"), "{}", accepted.printed);
     assert_eq!(fixture.harness("track history.jsonl --accept f00f00f00f00").code, 2);
+    let without = "accepted without effect: no metric has a step near";
+    assert!(!accepted.printed.contains(without), "{}", accepted.printed);
+    let last = history.lines().nth(15).unwrap().split("\"commit\":\"").nth(1).unwrap();
+    let nowhere = fixture.harness(&format!("track history.jsonl --accept {}", &last[..12]));
+    assert!(nowhere.code == 0 && nowhere.printed.contains(without), "{}", nowhere.printed);
+    // A working tree with changes is no commit, but for those of the history.
+    git("add history.jsonl gate.toml");
+    git("commit --quiet -m history");
+    let track = "track history.jsonl --value case/words=44";
+    let appended = [fixture.harness(track), fixture.harness(track)];
+    for of in appended {
+        assert!(of.code == 0 && of.printed.contains(": history\n"), "{}", of.printed);
+    }
+    fixture.write("gate.toml", "changed");
+    let refused = fixture.harness(track);
+    assert!(refused.code == 2 && refused.printed.contains("give --commit"), "{}", refused.printed);
+    assert_eq!(fixture.harness(&format!("{track} --commit HEAD")).code, 0);
+    git("checkout --quiet gate.toml");
     // A metric that is measured no more is named, and a history of nothing is not green.
     git("commit --quiet --allow-empty -m other");
     let ended = fixture.harness("track history.jsonl --value case/other=1");
@@ -358,6 +396,11 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
     assert_eq!(two.code, 2, "{}", two.printed);
     let again = fixture.harness(&format!("{gate} --baseline HEAD~1 --candidate HEAD"));
     assert!(!again.printed.contains("building"), "{}", again.printed);
+    // With a variable of compilers, it is another build.
+    let kept = format!("{gate} --baseline HEAD~1 --candidate HEAD");
+    let building = ["RUSTFLAGS", "RUSTFLAGS", "OTHER", "OTHER"]
+        .map(|name| fixture.harness_with(&kept, name, "-O").printed.contains("building"));
+    assert_eq!(building, [true, false, true, false]);
     let elsewhere = fixture.harness(&format!("{} --baseline HEAD~1", gate.replace("other/", ".")));
     assert_eq!(elsewhere.code, 2, "{}", elsewhere.printed);
 }

@@ -1,6 +1,6 @@
 //! Figures over cells: run time (counterparts of the paper's Figures 17 and 18), rate and memory. All numbers of the paper are those of `reports/paper.md`.
 
-use super::groups::{OWN, Subject, cited, is_counterpart, point, provenance, repetitions};
+use super::groups::{OWN, Subject, cited, clocks, is_counterpart, point, provenance, repetitions};
 use super::{models, scaling};
 use crate::figure::{Axis, Figure, Provenance, Series};
 use bench::experiments::entry::Comm;
@@ -73,7 +73,10 @@ fn over_cells(
     [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (mesh, repetitions) = (subject.mesh(), repetitions(all, &value));
+    let (mesh, mut repetitions) = (subject.mesh(), repetitions(all, &value));
+    if id != "memory" {
+        repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
+    }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
     let id = format!("{id}-{}", subject.file());
     let title = format!("{title}: {mesh}");

@@ -40,6 +40,18 @@ pub fn repetitions(groups: &[&Group], value: impl Fn(&Group) -> Median) -> Strin
     format!("Medians of {runs} runs{bars}.{projected}")
 }
 
+/// The clock of each program, as a sentence, if they are not the same.
+pub fn clocks<'a>(groups: impl Iterator<Item = &'a Group>) -> Option<String> {
+    let of_clock = by_key(groups.filter(|g| g.setup.comm != Comm::Sim), |g| {
+        let is_own = g.runs.iter().any(|run| run.time_wall_s != run.time_launch_s);
+        if is_own { "the program's own clock" } else { "the whole process, seen from outside" }
+    });
+    let programs = |of: &[&Group]| distinct(of.iter().map(|g| &*g.setup.engine)).join(", ");
+    let clocks = of_clock.iter().map(|(clock, of)| format!("{}: {clock}", programs(of)));
+    let clocks = clocks.collect::<Vec<_>>().join("; ");
+    (of_clock.len() > 1).then(|| format!("Measured times are of different clocks: {clocks}."))
+}
+
 /// The origin of the times of single ranks, as a sentence.
 pub fn rank_times(groups: &[&Group]) -> String {
     let n = range(groups, |g| g.time_s.count as u64);

@@ -59,7 +59,19 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let models: String = models::tables(&groups).iter().map(latex::table).collect();
     write(&directory.join("models.tex"), models)?;
     write(&directory.join("models.csv"), models::csv(&groups))?;
-    Ok(Written { page, figures: figures.len(), notes: groups.notes, broken, numbers })
+    let notes = groups.notes.into_iter().chain(left_over(&place, &figures)?).collect();
+    Ok(Written { page, figures: figures.len(), notes, broken, numbers })
+}
+
+/// Names the figures of a directory that are not among these, such as those of an earlier report.
+fn left_over(place: &Path, figures: &[Figure]) -> io::Result<Option<String>> {
+    let names = fs::read_dir(place)?.map(|entry| Ok(entry?.file_name().display().to_string()));
+    let mut names: Vec<String> = names.collect::<io::Result<_>>()?;
+    let is_other = |id: &str| figures.iter().all(|figure| figure.id != id);
+    names.retain(|name| name.strip_suffix(".svg").is_some_and(is_other));
+    names.sort();
+    let (of, names) = ("figures/ also has figures that are not of this report", names.join(", "));
+    Ok((!names.is_empty()).then(|| format!("{of}: {names}")))
 }
 
 /// Writes a figure in all formats; returns it with its SVG.

@@ -9,8 +9,9 @@ use bench::experiments::group::{Group, Groups};
 use bench::experiments::model::{At, Key, Kind, Tested};
 use bench::order::{by_key, distinct};
 use contract::number::{digits, grouped};
+use std::collections::BTreeSet;
 
-/// Points of a model's line.
+/// Points of a model's line, beside those at the ranks of runs.
 const POINTS: usize = 40;
 /// Runs on more than this share of the most ranks are held out: the first one that leaves enough.
 const HELD_OUT: [f64; 2] = [1.0 / 16.0, 0.25];
@@ -159,9 +160,14 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
 }
 
 fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure {
-    let ends = [0, of.len() - 1].map(|i| (of[i].setup.ranks as f64).ln());
-    let modelled = |i: usize| {
-        let ranks = (ends[0] + (ends[1] - ends[0]) * i as f64 / (POINTS - 1) as f64).exp();
+    let measured = of.iter().map(|group| group.setup.ranks);
+    let ends = [of[0], of[of.len() - 1]].map(|group| (group.setup.ranks as f64).ln());
+    let between = |i: usize| ends[0] + (ends[1] - ends[0]) * i as f64 / (POINTS - 1) as f64;
+    // The model has steps between powers of two: at the ranks of runs the line has the values of the table.
+    let ranks: BTreeSet<usize> =
+        (0..POINTS).map(|i| between(i).exp().round() as usize).chain(measured).collect();
+    let modelled = |ranks: &usize| {
+        let ranks = *ranks as f64;
         let at = At { cells: cells as f64, ranks, facets: of[0].typical.facets as f64 };
         let [low, y, high] = model.run_s(&at, &of[0].network);
         Point { x: ranks, y, low, high }
@@ -174,7 +180,7 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
         let runs = Series::new(name, Provenance::Projected, style, points.collect());
         runs.drawn_as(crate::figure::Kind::Scattered)
     };
-    let line = (0..POINTS).map(modelled).collect();
+    let line = ranks.iter().map(modelled).collect();
     let line = Series::new("model and its band", Provenance::Modelled, 0, line);
     let series = vec![line, runs("fitted runs", 0, seen), runs("held-out runs", 1, held_out)];
     let caption = format!(

@@ -7,7 +7,9 @@ use super::groups::{
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::pop::{Efficiency, Factor, above_one, heaviest_base_leaf, phase_s};
+use bench::experiments::pop::{
+    DISTURBED, Efficiency, Factor, above_one, heaviest_base_leaf, phase_s,
+};
 use bench::order::{by_key, distinct};
 use contract::number::{digits, grouped};
 use contract::paper::{number, speedup as speedup_of_paper};
@@ -93,10 +95,15 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
         repetitions(all, |group| groups.speedup(group)),
         Groups::networks(all.iter().copied()),
     );
-    if series[1..].iter().flat_map(|s| &s.points).any(|p| p.y > p.x) {
-        let efficiencies: Vec<_> = all.iter().map(|group| groups.efficiency(group)).collect();
-        let disturbed = "A speedup per rank above 1 means that the base case was disturbed.";
-        caption += &format!(" {}", above_one(&efficiencies).as_deref().unwrap_or(disturbed));
+    // The reason for one point is none for another.
+    let above = all.iter().filter(|g| groups.speedup(g).value > g.setup.ranks as f64 + 1e-9);
+    let reason = |group: &&Group| {
+        let efficiency = groups.efficiency(group).filter(|e| e.global() > 1.0);
+        efficiency.and_then(|e| above_one(&[e])).unwrap_or(DISTURBED.to_owned())
+    };
+    for (reason, of) in by_key(above, reason) {
+        let points = of.iter().map(|group| group.how_on()).collect::<Vec<_>>().join(", ");
+        caption += &format!(" Above ideal ({points}): {reason}");
     }
     if is_counterpart(subject.case) && (45_000_000..=55_000_000).contains(&all[0].cells()) {
         let points = [(1.0, 1.0), (number("parallel_ranks"), speedup_of_paper())];
@@ -115,7 +122,9 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
 
 /// Global efficiency and its factors on simulated ranks.
 fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) -> Option<Figure> {
-    let last = sims.last().filter(|_| sims.len() > 1)?;
+    let known = sims.iter().filter_map(|group| Some((*group, groups.efficiency(group)?)));
+    let (sims, efficiencies): (Vec<&Group>, Vec<Efficiency>) = known.unzip();
+    let (sims, last) = (&sims[..], sims.last().filter(|_| sims.len() > 1)?);
     let factors: [(&str, Factor); 5] = [
         ("global", Efficiency::global),
         ("parallel", Efficiency::parallel),
@@ -123,7 +132,6 @@ fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) ->
         ("communication", Efficiency::communication),
         ("computation scaling", |e| e.computation_scaling),
     ];
-    let efficiencies: Vec<_> = sims.iter().map(|group| groups.efficiency(group)).collect();
     let mut series = vec![ideal(sims, |_| 1.0)];
     for (style, (name, value)) in factors.into_iter().enumerate() {
         let factor = |(g, e): (&&Group, &Efficiency)| Point::exact(g.setup.ranks as f64, value(e));

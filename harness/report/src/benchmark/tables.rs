@@ -1,11 +1,11 @@
 //! The tables of a record, for the page of a report and as text.
 
-use super::groups::Subject;
+use super::groups::{Subject, clocks};
 use super::models;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Run};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::pop::{self, Efficiency, above_one, phase_s};
+use bench::experiments::pop::{self, Efficiency, UNKNOWN, above_one, phase_s};
 use bench::order::{by_key, distinct};
 use contract::number::{digits, grouped};
 
@@ -46,14 +46,14 @@ pub fn causes(groups: &Groups) -> Vec<String> {
 /// Time, load imbalance λ = max/mean, POP efficiencies, rate and memory of every group.
 fn experiment(groups: &Groups, name: &str) -> Table {
     let of = groups.all.iter().filter(|g| g.setup.experiment == name);
-    let of: Vec<(&Group, Efficiency)> = of.map(|g| (g, groups.efficiency(g))).collect();
+    let of: Vec<(&Group, Option<Efficiency>)> = of.map(|g| (g, groups.efficiency(g))).collect();
     let lambda = |group: &Group| {
         let counted = group.typical.counters.get("leaves");
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
     };
-    let of_base = |group: &Group, value: f64| {
-        if groups.has_reference(group) { format!("{value:.3}") } else { "–".to_owned() }
-    };
+    let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
+    let of_base =
+        |group: &Group, value: Option<f64>| shown(value.filter(|_| groups.has_reference(group)));
     let table = Table::of(
         name.to_owned(),
         &of,
@@ -71,20 +71,26 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("interval", &|(g, _)| [g.time_s.low, g.time_s.high].map(digits).join(" – ")),
             ("coverage", &|(g, _)| format!("{} %", g.time_s.per_cent())),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
-            ("λ\n(time)", &|(_, e)| format!("{:.3}", 1.0 / e.load_balance)),
+            ("λ\n(time)", &|(_, e)| shown(e.map(|e| 1.0 / e.load_balance))),
             ("λ\n(cells)", &|(g, _)| lambda(g)),
-            ("serialisation", &|(_, e)| format!("{:.3}", e.serialisation)),
-            ("transfer", &|(_, e)| format!("{:.3}", e.transfer)),
-            ("parallel\nefficiency", &|(_, e)| format!("{:.3}", e.parallel())),
-            ("computation\nscaling", &|(g, e)| of_base(g, e.computation_scaling)),
-            ("global\nefficiency", &|(g, e)| of_base(g, e.global())),
+            ("serialisation", &|(_, e)| shown(e.map(|e| e.serialisation))),
+            ("transfer", &|(_, e)| shown(e.map(|e| e.transfer))),
+            ("parallel\nefficiency", &|(_, e)| shown(e.map(|e| e.parallel()))),
+            ("computation\nscaling", &|(g, e)| of_base(g, e.map(|e| e.computation_scaling))),
+            ("global\nefficiency", &|(g, _)| of_base(g, Some(groups.global_efficiency(g).value))),
             ("base case", &|(g, _)| groups.reference(g).how_on()),
             ("10⁶\ncells / s / rank", &|(g, _)| format!("{:.2}", g.rates().value)),
             ("bytes / cell", &|(g, _)| known(g.bytes_per_cell(), 2)),
         ],
     );
-    let efficiencies: Vec<Efficiency> = of.iter().map(|(_, e)| *e).collect();
-    Table { notes: above_one(&efficiencies).into_iter().collect(), ..table }
+    let efficiencies: Vec<Efficiency> = of.iter().filter_map(|(_, e)| *e).collect();
+    let without = distinct(of.iter().filter(|(_, e)| e.is_none()).map(|(g, _)| &g.setup.engine));
+    let left_out = without.iter().map(|engine| {
+        format!("Factors of {engine} are left out (–), and its efficiencies are of run times: {UNKNOWN}.")
+    });
+    let clocks = clocks(groups.all.iter().filter(|g| g.setup.experiment == name));
+    let notes = above_one(&efficiencies).into_iter().chain(left_out).chain(clocks).collect();
+    Table { notes, ..table }
 }
 
 /// A median with so many decimals, if it is known.
@@ -225,6 +231,27 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
+    }
+
+    #[test]
+    fn factors_that_nobody_reports_are_left_out_with_the_reason() {
+        let lines = [&[4.0][..], &[2.5, 2.5]].map(|times| {
+            let mut run = run(Comm::Mpi, 1_000_000, &[("all", times)]);
+            (run.phases, run.useful_s) = (Vec::new(), Spread::default());
+            line(Entry::Run(Box::new(run)))
+        });
+        let groups = Groups::of(&lines);
+        let table = experiment(&groups, "strong");
+        let value = |name: &str| {
+            let at = table.columns.iter().position(|column| *column == name).unwrap();
+            table.rows[1][at].as_str()
+        };
+        for factor in ["λ\n(time)", "serialisation", "transfer", "parallel\nefficiency"] {
+            assert_eq!(value(factor), "–", "{factor}");
+        }
+        assert_eq!(value("global\nefficiency"), "0.800");
+        assert!(table.notes[0].contains(UNKNOWN), "{:?}", table.notes);
+        assert!(causes(&groups)[0].ends_with(UNKNOWN), "{:?}", causes(&groups));
     }
 
     fn by(engine: &str, cells: u64, phase: &str) -> Line {

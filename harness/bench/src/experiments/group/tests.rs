@@ -83,7 +83,7 @@ fn a_run_without_a_result_is_of_the_machine_and_the_case_of_its_session() {
     let second = ("mesher [2]", "cube [2]");
     // A mesh of targets that has the name of a case.
     assert_eq!(names, [("mesher", "cube"), ("mesher", "cube"), second, ("mesher [2]", "cube")]);
-    assert_eq!(groups.efficiency(&groups.all[2]).global(), 1.0);
+    assert_eq!(groups.global_efficiency(&groups.all[2]).value, 1.0);
     let [missing] = &groups.missing[..] else { panic!("{:?}", groups.missing) };
     assert!(missing.starts_with("a run is missing, mesher [2] cube [2] strong"), "{missing}");
 }
@@ -325,7 +325,7 @@ fn repetitions_form_a_group_without_warm_ups() {
     assert_eq!(two.typical.useful_s.sum, 4.0);
     let reference = groups.reference(two);
     assert_eq!(reference.setup.ranks, 1);
-    let e = two.efficiency(reference);
+    let e = two.efficiency(reference).unwrap();
     assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
 }
 
@@ -388,21 +388,32 @@ fn the_time_of_efficiencies_is_the_median_of_an_even_number_of_runs() {
     };
     let groups = Groups::of(&[of(2.0), of(4.0)]);
     assert_eq!(groups.all[0].time_s.value, 3.0);
-    assert_eq!(groups.efficiency(&groups.all[0]).parallel(), 1.0 / 3.0);
+    assert_eq!(groups.efficiency(&groups.all[0]).unwrap().parallel(), 1.0 / 3.0);
 }
 
 /// Their useful time is the wall time, to which no CPU time of a disturbed run is near.
 #[test]
-fn serial_runs_without_phases_are_ideal_and_have_a_cpu_time() {
+fn runs_without_phases_have_a_cpu_time_and_a_speedup_and_no_factors() {
     let of = |time_s: f64| {
         let mut run = run(Comm::Solo, 9, &[("a", &[time_s])]);
         (run.phases, run.time_cpu_s) = (Vec::new(), 2.0);
         line_of(run)
     };
     let groups = Groups::of(&[of(2.0), of(2.4), of(3.0), of(4.0)]);
-    let (group, e) = (&groups.all[0], groups.efficiency(&groups.all[0]));
-    assert_eq!((e.parallel(), e.global(), group.time_s.value), (1.0, 1.0, 2.7));
+    let group = &groups.all[0];
+    assert_eq!((groups.efficiency(group), group.imbalance()), (None, None));
+    assert_eq!((groups.global_efficiency(group).value, group.time_s.value), (1.0, 2.7));
     assert_eq!(group.cpu_s().unwrap().value, 2.0);
+    // On two ranks, of which one computes longer: as older records have it, with useful times.
+    let mut two = run(Comm::Mpi, 9, &[("a", &[2.0, 2.0])]);
+    two.phases.clear();
+    let groups = Groups::of(&[of(3.0), line_of(two.clone())]);
+    let group = &groups.all[1];
+    assert_eq!((groups.efficiency(group), group.imbalance()), (None, None));
+    assert_eq!((groups.speedup(group).value, groups.global_efficiency(group).value), (1.5, 0.75));
+    assert_eq!(group.cpu_s().unwrap().value, 4.0);
+    two.time_cpu_s = 0.1;
+    assert_eq!(Groups::of(&[line_of(two)]).all[0].cpu_s(), None, "that of a launcher");
 }
 
 /// It would depend on the other series of a study.
@@ -430,7 +441,7 @@ fn two_series_of_a_case_have_bases_of_their_own() {
     let groups = Groups::of(&[of(1, 10, 10.0), of(2, 20, 10.0), of(1, 40, 40.0), of(2, 80, 40.0)]);
     for group in &groups.all {
         assert_eq!(groups.reference(group).setup.series_cells, group.setup.series_cells);
-        assert_eq!(groups.efficiency(group).global(), 1.0);
+        assert_eq!(groups.efficiency(group).unwrap().global(), 1.0);
     }
 }
 
@@ -455,7 +466,7 @@ fn efficiency_and_imbalance_have_the_intervals_of_the_repetitions() {
     };
     let groups = with_base(&[4.0, 4.0, 4.0]);
     let two = &groups.all[1];
-    let (efficiency, imbalance) = (groups.global_efficiency(two), two.imbalance());
+    let (efficiency, imbalance) = (groups.global_efficiency(two), two.imbalance().unwrap());
     let found = [efficiency, imbalance].map(|of| [of.low, of.value, of.high]);
     let expected = [[0.5, 4.0 / 6.0, 1.0], [1.0, 1.2, 1.5]];
     let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
