@@ -19,6 +19,7 @@ use contract::failure::Failure as Input;
 use run::engine::failure::{End, Failure};
 use run::engine::process::printed;
 use run::engine::runner::Engine;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -31,6 +32,17 @@ fn name_of(variant: &impl serde::Serialize) -> String {
 /// Returns the first reason that applies.
 fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
     reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
+}
+
+/// Returns a command line for people, without the directories of programs and files.
+pub fn shown(words: impl IntoIterator<Item = impl AsRef<OsStr>>) -> String {
+    let word = |word: &OsStr| {
+        let name = Path::new(word).file_name().filter(|_| Path::new(word).is_absolute());
+        name.unwrap_or(word).to_string_lossy().into_owned()
+    };
+    let words: Vec<String> = words.into_iter().map(|of| word(of.as_ref())).collect();
+    let line = shlex::try_join(words.iter().map(String::as_str));
+    line.expect("an argument of a process has no zero bytes")
 }
 
 /// Returns what git prints in a directory; `None` if it fails.

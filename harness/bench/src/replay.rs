@@ -242,19 +242,18 @@ fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
     }
     let base = groups.reference(group);
     let scales = base.setup.ranks < group.setup.ranks;
-    let ratios = [
-        ("bytes per cell", group.bytes_per_cell()),
-        ("load imbalance", (group.setup.ranks > 1).then(|| group.imbalance())),
-        ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
-        ("efficiency", scales.then(|| groups.global_efficiency(group))),
-    ];
+    let speedup = (scales && base.cells() == group.cells()).then(|| groups.speedup(group));
     let over_base = format!("{} over {}:{}", group.how(), base.how(), base.setup.ranks);
-    for (quantity, ratio) in ratios {
-        let has_base = ["speedup", "efficiency"].contains(&quantity);
-        let how = if has_base { over_base.clone() } else { group.how().to_owned() };
+    let ratios = [
+        ("bytes per cell", group.how(), group.bytes_per_cell()),
+        ("load imbalance", group.how(), (group.setup.ranks > 1).then(|| group.imbalance())),
+        ("speedup", &over_base, speedup),
+        ("efficiency", &over_base, scales.then(|| groups.global_efficiency(group))),
+    ];
+    for (quantity, how, ratio) in ratios {
         if let Some(Median { value, low, high, .. }) = ratio.filter(|of| of.value.is_finite()) {
             let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
-            add(quantity, Found::Ratio { value, low, high, how });
+            add(quantity, Found::Ratio { value, low, high, how: how.to_owned() });
         }
     }
     add("time", Found::Time(group.time_s.value));

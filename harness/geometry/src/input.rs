@@ -6,7 +6,7 @@ use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
 use contract::files;
 use contract::lattice::Root;
-use contract::manifest::{ExtentBox, Keep};
+use contract::manifest::ExtentBox;
 use contract::stl::{self, Body};
 use parry3d_f64::bounding_volume::BoundingVolume as _;
 use serde::Serialize;
@@ -23,8 +23,6 @@ pub struct Requested {
     pub root: Option<Root>,
     /// Edge length of the root, in longest edges of the bounding box.
     pub root_scale: Option<f64>,
-    /// The side that is kept.
-    pub keep: Keep,
 }
 
 /// The bounding box and its distances from the root's faces.
@@ -52,14 +50,13 @@ impl Input {
     ///
     /// # Errors
     /// If a file cannot be read or the geometry cannot be meshed.
-    pub fn read(path: &Path, mut requested: Requested) -> Result<Self> {
+    pub fn read(path: &Path, requested: Requested) -> Result<Self> {
         let wrong = |why: String| Failure::about(path, why);
         let (table, Body { facets, solids }) = if path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
         {
-            let Case { facets, solids, rules, .. } = Case::read(path)?;
-            requested.keep = rules.keep;
+            let Case { facets, solids, .. } = Case::read(path)?;
             let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
             let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;
             table.retain(|key, _| match key {
@@ -132,6 +129,7 @@ const FACETS_MAX: usize = (1 << 31) / 3;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::manifest::Keep;
 
     const FACET: Facet = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 

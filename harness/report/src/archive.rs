@@ -4,6 +4,7 @@ use crate::benchmark::machines;
 use bench::experiments::entry::{Line, now_utc};
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
+use bench::shown;
 use bench::study::package;
 use contract::number::duration;
 use serde_json::{Value, json};
@@ -65,7 +66,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         let used: Vec<Value> = used.collect();
         Some(json!({
             "@id": format!("#session-{name}"), "@type": "CreateAction",
-            "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
+            "name": shown(&opening.command),
             "description": opening.machine.to_string(),
             "startTime": of.first()?.time_utc, "endTime": of.last()?.time_utc,
             "instrument": used, "object": id(&format!("{STUDY}/{}", package::STUDY)), "result": id(RECORD),

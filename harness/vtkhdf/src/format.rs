@@ -1,4 +1,4 @@
-//! What the writer and the reader know of HDF5: signatures, codes of messages, types of elements, arrays in chunks, and the checksum.
+//! What the writer and the reader know of HDF5: the signature, arrays in chunks, and the checksum.
 
 use std::ops::Range;
 
@@ -10,42 +10,6 @@ pub(crate) const SUPERBLOCK_BYTES: usize = 48;
 pub(crate) const TABLE_HEAD_BYTES: u64 = 28;
 /// The address of what is not stored.
 pub(crate) const UNDEFINED: u64 = u64::MAX;
-
-/// Codes of messages in object headers.
-pub(crate) mod message {
-    pub(crate) const DATASPACE: u8 = 1;
-    pub(crate) const LINK_INFO: u8 = 2;
-    pub(crate) const DATATYPE: u8 = 3;
-    pub(crate) const FILL_VALUE: u8 = 5;
-    pub(crate) const LINK: u8 = 6;
-    pub(crate) const LAYOUT: u8 = 8;
-    pub(crate) const GROUP_INFO: u8 = 10;
-    pub(crate) const FILTERS: u8 = 11;
-    pub(crate) const ATTRIBUTE: u8 = 12;
-}
-
-/// Layouts of arrays: in the object header, or in chunks.
-pub(crate) const LAYOUT_VERSION: u8 = 4;
-pub(crate) const LAYOUT_COMPACT: u8 = 0;
-pub(crate) const LAYOUT_CHUNKED: u8 = 2;
-/// The index of chunks is a *fixed array*: a table of as many entries as chunks.
-pub(crate) const INDEX_FIXED_ARRAY: u8 = 3;
-/// Base-2 logarithm of the entries from which on the table would have pages: more than any file of ours has.
-pub(crate) const PAGE_BITS: u8 = 24;
-
-/// Fill value messages: the value is zero, and space is allocated early, or chunk by chunk.
-pub(crate) const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];
-pub(crate) const ALLOCATED_BY_CHUNK: [u8; 2] = [3, 0b1011];
-
-/// The types of an array's elements. All are little-endian.
-pub(crate) mod datatype {
-    pub(crate) const BYTE: &[u8] = &[0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0];
-    pub(crate) const INT32: &[u8] = &[0x10, 8, 0, 0, 4, 0, 0, 0, 0, 0, 32, 0];
-    pub(crate) const INT64: &[u8] = &[0x10, 8, 0, 0, 8, 0, 0, 0, 0, 0, 64, 0];
-    /// An implied leading bit of the mantissa, the sign at bit 63; exponent at bit 52 with 11 bits, mantissa at bit 0 with 52 bits, bias 1023.
-    pub(crate) const DOUBLE: &[u8] =
-        &[0x11, 0x20, 63, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xff, 3, 0, 0];
-}
 
 /// A one-dimensional array of bytes in compressed chunks of equal length.
 #[derive(Clone, Debug, PartialEq, Eq)]

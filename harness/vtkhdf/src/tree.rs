@@ -6,8 +6,8 @@
 //! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
 //! are packed from the most significant one. Cell data have an element for every node.
 
-use crate::format::{Chunked, SUPERBLOCK_BYTES, datatype};
-use crate::write::{Deflater, Metadata, Value};
+use crate::format::{Chunked, SUPERBLOCK_BYTES};
+use crate::write::{Deflater, Metadata, Value, datatype};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
 

@@ -1,11 +1,43 @@
-//! Metadata of HDF5 files: tables of chunks, object headers and the superblock.
+//! Metadata of HDF5 files: tables of chunks, object headers and the superblock; and compressed chunks.
 
-use crate::format::{
-    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, INDEX_FIXED_ARRAY, LAYOUT_CHUNKED,
-    LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES, UNDEFINED, datatype,
-    lookup3, message,
-};
+use crate::format::{Chunked, SIGNATURE, TABLE_HEAD_BYTES, UNDEFINED, lookup3};
 use flate2::{Compress, Compression, FlushCompress, Status};
+
+/// Codes of messages in object headers.
+mod message {
+    pub(super) const DATASPACE: u8 = 1;
+    pub(super) const LINK_INFO: u8 = 2;
+    pub(super) const DATATYPE: u8 = 3;
+    pub(super) const FILL_VALUE: u8 = 5;
+    pub(super) const LINK: u8 = 6;
+    pub(super) const LAYOUT: u8 = 8;
+    pub(super) const GROUP_INFO: u8 = 10;
+    pub(super) const FILTERS: u8 = 11;
+    pub(super) const ATTRIBUTE: u8 = 12;
+}
+
+/// Layouts of arrays: in the object header, or in chunks.
+const LAYOUT_VERSION: u8 = 4;
+const LAYOUT_COMPACT: u8 = 0;
+const LAYOUT_CHUNKED: u8 = 2;
+/// The index of chunks is a *fixed array*: a table of as many entries as chunks.
+const INDEX_FIXED_ARRAY: u8 = 3;
+/// Base-2 logarithm of the entries from which on the table would have pages: more than any file of ours has.
+const PAGE_BITS: u8 = 24;
+
+/// Fill value messages: the value is zero, and space is allocated early, or chunk by chunk.
+const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];
+const ALLOCATED_BY_CHUNK: [u8; 2] = [3, 0b1011];
+
+/// The types of an array's elements. All are little-endian.
+pub(crate) mod datatype {
+    pub(crate) const BYTE: &[u8] = &[0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0];
+    pub(crate) const INT32: &[u8] = &[0x10, 8, 0, 0, 4, 0, 0, 0, 0, 0, 32, 0];
+    pub(crate) const INT64: &[u8] = &[0x10, 8, 0, 0, 8, 0, 0, 0, 0, 0, 64, 0];
+    /// An implied leading bit of the mantissa, the sign at bit 63; exponent at bit 52 with 11 bits, mantissa at bit 0 with 52 bits, bias 1023.
+    pub(crate) const DOUBLE: &[u8] =
+        &[0x11, 0x20, 63, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xff, 3, 0, 0];
+}
 
 /// A small array, or the value of an attribute, as HDF5 describes it.
 pub(crate) struct Value {

@@ -375,6 +375,12 @@ pub struct Run {
 }
 
 impl Run {
+    /// Returns the critical path on an ideal network: ranks wait for each other at the end of a phase. A program that reports no phases has one.
+    pub(crate) fn path_s(&self) -> f64 {
+        let path = self.phases.iter().map(|phase| phase.useful_s.max).reduce(|a, b| a + b);
+        path.unwrap_or(self.useful_s.max)
+    }
+
     /// Whether it has ranks, at most a million, of which all values are stored, or none; a wall time, which is at most that of the launcher
     /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and
     /// sums that are those of the ranks and of the phases, of which the slowest rank takes no longer than all phases on theirs.
@@ -392,8 +398,7 @@ impl Run {
         let equal = setup.ranks as f64 * useful_s.max;
         let off = rounding(setup.ranks * phases.len(), total);
         let slowest = phases.iter().map(|phase| phase.wall_s.max).fold(0.0, f64::max);
-        let path = phases.iter().map(|phase| phase.useful_s.max).reduce(|a, b| a + b);
-        let path = path.unwrap_or(useful_s.max);
+        let path = self.path_s();
         (1..=1_000_000).contains(&setup.ranks)
             && (setup.comm != Comm::Sim || path > 0.0)
             && *time_wall_s > 0.0

@@ -3,6 +3,7 @@
 
 use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
 use super::machine;
+use crate::shown;
 use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::{Failure, Result};
@@ -10,10 +11,8 @@ use run::engine::description::is_own;
 use run::engine::layout::{Launcher, Layout, Ranks, RunOptions, node_count};
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine, Programs};
-use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use std::time::Duration;
 
 /// The partitioner that is not used where it has too few base leaves.
@@ -73,7 +72,7 @@ impl Runner<'_> {
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi
                 && setup.ranks > machine::cores() * node_count(),
-            command: shown(&command),
+            command: shown([command.get_program()].into_iter().chain(command.get_args())),
             facets: report.facets,
             geometry: report.geometry.map(|geometry| geometry.digest),
             inputs: String::new(),
@@ -169,16 +168,6 @@ fn spread(counts: &[u64]) -> Spread {
     Spread::brief(&counts.iter().map(|&count| count as f64).collect::<Vec<_>>())
 }
 
-/// A command line for people, without the directories of programs and files.
-fn shown(command: &Command) -> String {
-    let word = |word: &OsStr| {
-        let name = Path::new(word).file_name().filter(|_| Path::new(word).is_absolute());
-        name.unwrap_or(word).to_string_lossy().into_owned()
-    };
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    words.map(word).collect::<Vec<_>>().join(" ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,9 +180,8 @@ mod tests {
 
     #[test]
     fn a_shown_command_contains_no_directory_of_the_machine() {
-        let mut command = Command::new("/opt/bin/mpirun");
-        command.args(["-n", "2", "/opt/bin/mesher", "/tmp/x/uav.toml"]);
-        assert_eq!(shown(&command), "mpirun -n 2 mesher uav.toml");
+        let command = ["/opt/bin/mpirun", "-n", "2", "/opt/bin/mesher", "/tmp/x/a uav.toml"];
+        assert_eq!(shown(command), "mpirun -n 2 mesher 'a uav.toml'");
     }
 
     // An engine that is not ours.

@@ -7,10 +7,6 @@
 //! Invariants, executed by [`Groups::check_invariants`] before anything is computed from them: a group has runs, all of its
 //! setup and with its number of cells if the mesh is the same; its time lies in its interval, and that in the range of the
 //! repetitions extended to it; sums and maxima over ranks agree with the values rank by rank.
-//!
-//! Programs are compared on one core. Their CPU times are those of whole processes, seen from outside: they include the start of the program
-//! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
-//! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
 use super::entry::{
     ASSUMED, Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread, TARGETS,
@@ -101,11 +97,6 @@ impl Group {
         self.median_of(|run| is_of_ranks(run).then_some(run.time_cpu_s))
     }
 
-    /// Returns the CPU time of the geometry search, in seconds; `None` if the program does not report it.
-    pub fn search_s(&self) -> Option<Median> {
-        self.median_of(|run| Some(run.phases.iter().find(|p| p.name == "search")?.useful_s.sum))
-    }
-
     /// Whether more ranks than cores ran.
     pub fn oversubscribed(&self) -> bool {
         self.runs.iter().any(|r| r.oversubscribed)
@@ -186,10 +177,12 @@ impl Groups {
                     lacks.extend(session.lacks.clone());
                     sessions.insert(&line.session, session);
                 }
-                Entry::LeftOut(left) => left_out.push((named.len(), &line.session, left.clone())),
+                Entry::LeftOut(NoResult { setup, why }) => {
+                    left_out.push((named.len(), &line.session, setup, why.clone()));
+                }
                 Entry::Failure(NoResult { setup, why }) => {
-                    let (setup, why) = (setup.clone(), format!("{} failed: {why}", setup.engine));
-                    left_out.push((named.len(), &line.session, NoResult { setup, why }));
+                    let why = format!("{} failed: {why}", setup.engine);
+                    left_out.push((named.len(), &line.session, setup, why));
                 }
                 Entry::Run(as_recorded) => {
                     let setup = apart(as_recorded, session, network, &mut origins);
@@ -202,8 +195,7 @@ impl Groups {
                         None => runs.push((run, network.copied().unwrap_or(ASSUMED))),
                         Some(why) => {
                             notes.push(format!("a run is left out, {}: {why}", run.setup));
-                            let setup = as_recorded.setup.clone();
-                            left_out.push((0, &line.session, NoResult { setup, why }));
+                            left_out.push((0, &line.session, &as_recorded.setup, why));
                         }
                     }
                 }
@@ -214,14 +206,14 @@ impl Groups {
         let all: Vec<Group> =
             by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
         let is_of = |g: &Group, s: &Setup| (&g.setup.engine, &g.setup.case) == (&s.engine, &s.case);
-        let as_named = |(at, session, NoResult { setup, why }): (usize, &String, NoResult)| {
+        let as_named = |(at, session, setup, why): (usize, &String, &Setup, String)| {
             let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {
                 let last = named.iter().rfind(|(of, ran, _)| of == session && is_same(ran));
-                last.map_or(&setup, |(.., named)| named)
+                last.map_or(setup, |(.., named)| named)
             };
             let engine = of_runs(&|ran| ran.engine == setup.engine).engine.clone();
-            let case = of_runs(&|ran| case_of(ran) == case_of(&setup)).case.clone();
-            (at, Setup { engine, case, ..setup }, why)
+            let case = of_runs(&|ran| case_of(ran) == case_of(setup)).case.clone();
+            (at, Setup { engine, case, ..setup.clone() }, why)
         };
         // Without any run, or with no run after it: further repetitions are missing.
         let is_missing = |(at, setup, _): &(usize, Setup, String)| {
@@ -333,29 +325,6 @@ impl Groups {
         let sims = self.all.iter().filter(|g| g.setup.comm == Comm::Sim);
         sims.filter_map(|sim| Some([sim, measured(sim)?])).collect()
     }
-
-    /// Returns the comparisons of programs, in the order of the record.
-    pub fn comparisons(&self) -> Vec<Comparison<'_>> {
-        let by_size = |g: &&Group| ["strong", "spacing"].contains(&g.setup.experiment.as_str());
-        let is_serial = |g: &&Group| g.setup.ranks == 1 && g.setup.comm != Comm::Sim;
-        let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
-        let by_case = by_key(self.all.iter().filter(by_size).filter(is_serial), of_case);
-        by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
-    }
-
-    /// Returns the comparison of the programs that have these groups, if there are several.
-    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
-        let mut programs = by_key(groups, |g| g.setup.engine.as_str());
-        programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
-        let lacks = programs.iter().filter_map(|(name, _)| {
-            let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
-            Some(format!("{name} does not provide: {}", lacks.join(", ")))
-        });
-        let notes = lacks.collect();
-        let is_compared = programs.len() > 1;
-        let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
-        is_compared.then_some(Comparison { groups, notes })
-    }
 }
 
 /// What the runs on a mesh report of it: facets, cells, digest; empty where none of them does.
@@ -430,14 +399,6 @@ fn apart(
         setup.case += &cases.suffix(&mesh, digest);
     }
     setup
-}
-
-/// The runs of one case and n by several programs.
-pub struct Comparison<'a> {
-    /// Of at least two programs in the order of the record, each with its runs by cells.
-    pub groups: Vec<&'a Group>,
-    /// What the programs do not provide, a sentence each.
-    pub notes: Vec<String>,
 }
 
 #[cfg(test)]

@@ -103,9 +103,7 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
-    // The critical path on an ideal network. A program that reports no phases has a single one.
-    let path_s = run.phases.iter().map(|p| p.useful_s.max).reduce(|a, b| a + b);
-    let (time_s, path_s) = (time_s(run, network), path_s.unwrap_or(run.useful_s.max));
+    let (time_s, path_s) = (time_s(run, network), run.path_s());
     let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {
         load_balance: 1.0 / run.useful_s.lambda(run.setup.ranks),

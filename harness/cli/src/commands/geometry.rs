@@ -39,7 +39,7 @@ pub struct Arguments {
 /// If the geometry cannot be meshed, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
-    let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
+    let requested = Requested { spacing_min, root, root_scale };
     let diagnosis = diagnose(&Input::read(&arguments.file, requested)?, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
     let code = match () {

@@ -26,14 +26,12 @@ use contract::number::number;
 use contract::octant::edge_of;
 use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version,
-    VertexNumbers, Vtk,
-};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Summary, require_new};
 use crate::points::{Points, Polygons, edges, to_user};
+use crate::vtu::piece::{Piece, Zlib};
+use crate::vtu::{Array, END, describe, frame};
 
 /// A square of the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,50 +76,37 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
     Ok(faces)
 }
 
+/// The arrays of the polygons, in the order in which they are written.
+const ARRAYS: [Array; 6] = [
+    ("Points", "Points", "Float64"),
+    ("Polys", "connectivity", "Int64"),
+    ("Polys", "offsets", "Int64"),
+    ("CellData", "level", "UInt8"),
+    ("CellData", "side", "UInt8"),
+    ("CellData", "spacing", "Float64"),
+];
+
 /// Writes the polygons, with the cell data `level` and `side` of the leaf, and its `spacing`.
 ///
 /// # Errors
 /// If the mesh cannot be read or has no such faces, if the file cannot be written, or if the user interrupts.
 pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
     write(export, path, &|Front { root, faces, points, polygons }, out| {
-        let points = points.all.iter().flat_map(|at| to_user(at, root));
-        let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
-        let cell = vec![
-            array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
-            array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
-            array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
-        ];
-        let piece = PolyDataPiece {
-            points: points.collect::<Vec<f64>>().into(),
-            polys: Some(VertexNumbers::XML {
-                connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
-                offsets: polygons.ends.clone(),
-            }),
-            data: Attributes { point: Vec::new(), cell },
-            ..PolyDataPiece::default()
-        };
-        Ok(write_xml(piece, out)?)
+        let (of_points, cells) = (points.all.len() as u64, faces.len() as u64);
+        let mut piece = Piece { points: of_points, cells, ..Piece::default() };
+        let levels = faces.iter().map(|face| word::level(face.leaf));
+        let zlib = &mut Zlib::default();
+        piece.add(points.all.iter().map(|at| to_user(at, root)), zlib);
+        piece.add(polygons.corners.iter().map(|&corner| u64::from(corner)), zlib);
+        piece.add(polygons.ends.iter().copied(), zlib);
+        piece.add(levels.clone(), zlib);
+        piece.add(faces.iter().map(|face| (face.leaf & 3) as u8), zlib);
+        piece.add(levels.map(|level| root.edge_of(level)), zlib);
+        let [mut xml, end] = frame("PolyData");
+        describe("Polys", &ARRAYS, &piece, &mut xml);
+        let parts = [xml.as_bytes(), end.as_bytes(), &piece.bytes, END.as_bytes()];
+        Ok(parts.iter().try_for_each(|part| out.write_all(part))?)
     })
-}
-
-/// One value for each point or cell.
-fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
-    Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
-}
-
-/// Writes the polygons in VTK's format of XML.
-fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
-    let file = Vtk {
-        version: Version { major: 1, minor: 0 },
-        title: "front towards the body".into(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(piece),
-        file_path: None,
-    };
-    // The errors of vtkio do not say what the system said.
-    let mut bytes = Vec::new();
-    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
-    out.write_all(&bytes)
 }
 
 /// Writes the polygons as triangles. Coordinates have single precision.

@@ -1,11 +1,11 @@
-//! Cells as VTK's unstructured grid, in one `.vtu` file.
+//! Cells as VTK's unstructured grid, in one `.vtu` file; and what all of VTK's XML files have in common.
 //!
 //! Each leaf is a hexahedron. The mesh is written in pieces of at most [`PIECE`] leaves, so memory does not depend on the size of
 //! the mesh: about 60 MB.
 //!
 //! - `piece`: the arrays of a piece, compressed.
 
-mod piece;
+pub(crate) mod piece;
 
 use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
@@ -24,10 +24,10 @@ use piece::{Encoder, Piece};
 pub const PIECE: usize = 1 << 19;
 
 /// What follows the data.
-const END: &str = "\n  </AppendedData>\n</VTKFile>\n";
+pub const END: &str = "\n  </AppendedData>\n</VTKFile>\n";
 
 /// An array: its section in the XML, name, and VTK's name of the type.
-type Array = (&'static str, &'static str, &'static str);
+pub type Array = (&'static str, &'static str, &'static str);
 
 /// The arrays of a piece, in the order in which they are written. Ranks or sides are missing if they are unknown.
 const ARRAYS: [Array; 9] = [
@@ -98,25 +98,33 @@ fn header(root: &Root, arrays: &[Array], pieces: &[Piece], digest: Digest, bytes
     let Root { origin: [x, y, z], edge } = root;
     // VTK reads text as the codes of its characters.
     let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
+    let [begin, end] = frame("UnstructuredGrid");
     let mut xml = format!(
-        "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
-         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
-         compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n    <FieldData>\n      \
+        "{begin}    <FieldData>\n      \
          <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
          {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
          <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
          </FieldData>\n"
     );
-    pieces.iter().for_each(|piece| describe(arrays, piece, &mut xml));
-    let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
+    pieces.iter().for_each(|piece| describe("Cells", arrays, piece, &mut xml));
     let blanks = bytes.saturating_sub(xml.len() + end.len());
-    xml + &" ".repeat(blanks) + end
+    xml + &" ".repeat(blanks) + &end
 }
 
-/// Appends the description of a piece.
-fn describe(arrays: &[Array], piece: &Piece, xml: &mut String) {
+/// What precedes the descriptions of the pieces in a file of this kind, and what follows them: the appended data come next, and [`END`].
+pub fn frame(kind: &str) -> [String; 2] {
+    let begin = format!(
+        "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
+         <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+         compressor=\"vtkZLibDataCompressor\">\n  <{kind}>\n"
+    );
+    [begin, format!("  </{kind}>\n  <AppendedData encoding=\"raw\">\n   _")]
+}
+
+/// Appends the description of a piece, whose cells are of this kind.
+pub fn describe(kind: &str, arrays: &[Array], piece: &Piece, xml: &mut String) {
     let Piece { points, cells, offsets, .. } = piece;
-    *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
+    *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOf{kind}=\"{cells}\">\n");
     let arrays: Vec<_> = arrays.iter().zip(offsets).collect();
     for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {
         let section = arrays[0].0.0;

@@ -23,7 +23,7 @@ const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
 /// A piece in the form in which it is written.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Piece {
     /// Number of points.
     pub points: u64,
@@ -33,6 +33,14 @@ pub struct Piece {
     pub offsets: Vec<u64>,
     /// The compressed arrays.
     pub bytes: Vec<u8>,
+}
+
+impl Piece {
+    /// Adds an array of values, compressed.
+    pub fn add<T: NoUninit>(&mut self, values: impl ExactSizeIterator<Item = T>, zlib: &mut Zlib) {
+        self.offsets.push(self.bytes.len() as u64);
+        zlib.append(values, &mut self.bytes);
+    }
 }
 
 /// Encodes pieces one after the other. New memory for every piece would cost a page fault per page.
@@ -60,27 +68,25 @@ impl Encoder {
             self.digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
         }
         let Self { leaves, points, connectivity, zlib, .. } = self;
-        let points = &points.all;
+        let (points, cells) = (&points.all, 0..leaves.len());
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);
-        let cells = 0..leaves.len();
-        let (mut bytes, mut offsets) = (Vec::new(), Vec::new());
+        let (of_points, of_cells) = (points.len() as u64, cells.len() as u64);
+        let mut piece = Piece { points: of_points, cells: of_cells, ..Piece::default() };
         for (_, name, _) in arrays {
-            offsets.push(bytes.len() as u64);
-            let to = &mut bytes;
             match *name {
-                "Points" => zlib.append(points.iter().map(|at| to_user(at, root)), to),
-                "connectivity" => zlib.append(connectivity.iter().map(|&i| u64::from(i)), to),
-                "offsets" => zlib.append(cells.clone().map(|i| 8 * (i as u64 + 1)), to),
-                "types" => zlib.append(cells.clone().map(|_| HEXAHEDRON), to),
-                "level" => zlib.append(leaves.iter().map(|leaf| leaf.octant.level), to),
-                "rank" => zlib.append(leaves.iter().map(|leaf| leaf.rank), to),
-                "spacing" => zlib.append(leaves.iter().map(edge), to),
-                "id" => zlib.append(leaves.iter().map(|leaf| leaf.index), to),
-                _ => zlib.append(leaves.iter().map(|leaf| leaf.side as u8), to),
+                "Points" => piece.add(points.iter().map(|at| to_user(at, root)), zlib),
+                "connectivity" => piece.add(connectivity.iter().map(|&i| u64::from(i)), zlib),
+                "offsets" => piece.add(cells.clone().map(|i| 8 * (i as u64 + 1)), zlib),
+                "types" => piece.add(cells.clone().map(|_| HEXAHEDRON), zlib),
+                "level" => piece.add(leaves.iter().map(|leaf| leaf.octant.level), zlib),
+                "rank" => piece.add(leaves.iter().map(|leaf| leaf.rank), zlib),
+                "spacing" => piece.add(leaves.iter().map(edge), zlib),
+                "id" => piece.add(leaves.iter().map(|leaf| leaf.index), zlib),
+                _ => piece.add(leaves.iter().map(|leaf| leaf.side as u8), zlib),
             }
         }
         leaves.clear();
-        Piece { points: points.len() as u64, cells: cells.len() as u64, offsets, bytes }
+        piece
     }
 
     /// Finds the points.
@@ -118,7 +124,7 @@ impl Encoder {
 const BLOCK: usize = 24 << 12;
 
 /// A compressor and its memory.
-struct Zlib {
+pub struct Zlib {
     compressor: Compressor,
     block: Vec<u8>,
 }

@@ -8,6 +8,7 @@ use crate::page::{figure, page as whole_page};
 use bench::experiments::entry::{Entry, Line, Machine, Session};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
+use bench::shown;
 use maud::html;
 
 /// A figure and its SVG document.
@@ -54,14 +55,7 @@ pub fn machines(lines: &[Line]) -> Vec<Machine> {
 
 /// The command lines of the sessions, without repetitions and without absolute directories.
 fn commands(lines: &[Line]) -> Vec<String> {
-    let commands = lines.iter().filter_map(Line::session).map(|session| {
-        let words = session.command.iter().map(|word| match word.starts_with('/') {
-            true => word.rsplit('/').next().unwrap_or(word),
-            false => word,
-        });
-        shlex::try_join(words).expect("an argument of a process has no zero bytes")
-    });
-    distinct(commands)
+    distinct(lines.iter().filter_map(Line::session).map(|session| shown(&session.command)))
 }
 
 /// A rule that the record breaks: its number, 1 to 12, and the reason in a sentence.

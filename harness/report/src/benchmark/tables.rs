@@ -3,8 +3,8 @@
 use super::groups::Subject;
 use super::models;
 use crate::table::Table;
-use bench::experiments::entry::{Comm, Setup};
-use bench::experiments::group::{Comparison, Group, Groups};
+use bench::experiments::entry::{Comm, Run};
+use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{self, Efficiency, above_one, phase_s};
 use bench::order::{by_key, distinct};
 use contract::number::{digits, grouped};
@@ -17,7 +17,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     all.push(projections(groups));
     all.extend(largest(groups).into_iter().map(phases));
     all.extend(models::tables(groups));
-    all.extend(groups.comparisons().iter().map(programs));
+    all.extend(programs(groups));
     all.retain(|table| !table.rows.is_empty());
     all
 }
@@ -147,13 +147,40 @@ fn phases(group: &Group) -> Table {
     )
 }
 
-/// Several programs on one core, and what the programs do not provide.
-fn programs(comparison: &Comparison) -> Table {
-    let Setup { case, layer_cells_min, .. } = &comparison.groups[0].setup;
+/// A table for every case and n that several programs meshed on one core, with what they do not provide.
+///
+/// CPU times are those of whole processes, seen from outside: they include the start of the program and reading, hardly depend on other
+/// processes, and mean the same for every program. A phase named `search` is the part of that time in which a program finds the facets near
+/// an octant. With mpirun, times and memory are those of both.
+fn programs(groups: &Groups) -> Vec<Table> {
+    let by_size = |g: &&Group| ["strong", "spacing"].contains(&g.setup.experiment.as_str());
+    let is_serial = |g: &&Group| g.setup.ranks == 1 && g.setup.comm != Comm::Sim;
+    let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
+    let cases = by_key(groups.all.iter().filter(by_size).filter(is_serial), of_case);
+    cases.into_iter().filter_map(|(case, of)| comparison(groups, case, of)).collect()
+}
+
+/// The programs in the order of the record, each with its runs by cells; `None` of a single one.
+fn comparison(groups: &Groups, (case, n): (String, u32), of: Vec<&Group>) -> Option<Table> {
+    let mut programs = by_key(of, |group| group.setup.engine.as_str());
+    if programs.len() < 2 {
+        return None;
+    }
+    programs.iter_mut().for_each(|(_, of)| of.sort_by_key(|group| group.cells()));
+    let lacks = programs.iter().filter_map(|(name, _)| {
+        let lacks = groups.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
+        Some(format!("{name} does not provide: {}", lacks.join(", ")))
+    });
+    let notes = lacks.collect();
+    let all: Vec<&Group> = programs.into_iter().flat_map(|(_, of)| of).collect();
     let rate = |g: &Group| Some(g.cpu_s()?.falling(|s| g.cells() as f64 / s / 1e6));
+    let search_s = |g: &Group| {
+        let phase = |run: &Run| Some(run.phases.iter().find(|p| p.name == "search")?.useful_s.sum);
+        g.median_of(phase)
+    };
     let table = Table::of(
-        format!("programs on one core: {case}, n = {layer_cells_min}"),
-        &comparison.groups,
+        format!("programs on one core: {case}, n = {n}"),
+        &all,
         &[
             ("engine", &|g| match g.setup.comm {
                 Comm::Mpi => format!("{} with mpirun", g.setup.engine),
@@ -162,20 +189,20 @@ fn programs(comparison: &Comparison) -> Table {
             ("cells", &|g| grouped(g.cells())),
             ("CPU\ntime / s", &|g| known(g.cpu_s(), 3)),
             ("of\nit\nsearch / s", &|g| {
-                g.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
+                search_s(g).map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
             }),
             ("10⁶\ncells / s / core", &|g| known(rate(g), 3)),
             ("bytes / cell", &|g| known(g.bytes_per_cell(), 1)),
         ],
     );
-    Table { notes: comparison.notes.clone(), ..table }
+    Some(Table { notes, ..table })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::benchmark::numbers::{Number, numbers};
-    use bench::experiments::entry::{Entry, Line, NoResult, Session, Spread};
+    use bench::experiments::entry::{Entry, Line, NoResult, Session, Setup, Spread};
     use bench::testing::{line, run};
 
     #[test]
@@ -222,18 +249,16 @@ mod tests {
             line(Entry::LeftOut(left)),
         ];
         let groups = Groups::of(&lines);
-        let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
-        let table = programs(comparison);
+        let [table] = &programs(&groups)[..] else { panic!("one comparison") };
         assert_eq!(table.rows[0].join(" "), "mesher 2,000,000 2.000 not separate 1.000 0.5");
         assert_eq!(table.rows[1].join(" "), "slow 1,000,000 2.000 0.50 0.500 1.0");
         assert_eq!(table.notes, ["slow does not provide: layers, MPI"]);
         assert!(text(&groups).contains("n=4 solo:1 metis area: slow would take 9 s"));
-        assert!(Groups::of(&lines[..2]).comparisons().is_empty(), "one program is no comparison");
+        assert!(programs(&Groups::of(&lines[..2])).is_empty(), "one program is no comparison");
         let Entry::Run(mut slow) = lines[2].entry.clone() else { panic!("a run") };
         (slow.time_cpu_s, slow.peak_rss_bytes) = (1.0, Spread::brief(&[]));
         let groups = Groups::of(&[lines[1].clone(), line(Entry::Run(slow))]);
-        let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
-        let rows = programs(comparison).rows;
+        let rows = &programs(&groups)[0].rows;
         assert_eq!(rows[1].join(" "), "slow 1,000,000 unknown 0.50 unknown unknown");
         assert!(text(&groups).contains("       unknown\n"), "{}", text(&groups));
         let memory = |n: &&Number| n.key.starts_with("slow/") && n.key.ends_with("/memory");

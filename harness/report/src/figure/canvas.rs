@@ -11,8 +11,10 @@ pub const SYMBOL: f64 = 80.0;
 /// Distance of lines of text.
 const LEADING: f64 = SIZE + 8.0;
 
-/// Space at the right of the data, and between the label of the vertical axis and the edge of the page.
-pub const BESIDE: [f64; 2] = [40.0, 10.0];
+/// Space at the right of the data.
+pub const RIGHT: f64 = 40.0;
+/// Space between the label of the vertical axis and the edge of the page.
+pub const EDGE: f64 = 10.0;
 
 /// Colour of axes and text: that of the page's text where the drawing is part of a page, else black.
 pub const INK: &str = "currentColor";

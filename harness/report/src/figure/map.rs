@@ -4,12 +4,12 @@
 //! would make large files.
 
 use super::axes::{BELOW, Scale};
-use super::canvas::{BESIDE, INK, WIDTH, hex};
+use super::canvas::{INK, RIGHT, WIDTH, hex};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Greatest height of a map: it and its margins fit on a page.
-const MAP_HEIGHT_MAX: f64 = 1650.0;
+pub const MAP_HEIGHT_MAX: f64 = 1650.0;
 /// Space below the horizontal axis of a map, for its caption.
 pub const CAPTION: f64 = 80.0;
 
@@ -40,7 +40,7 @@ pub struct Map {
 /// The height of the page of a map, and the space at its right: its axes have one scale.
 pub fn size(x: &Scale, y: &Scale, top: f64) -> (u32, f64) {
     let [across, up] = [x, y].map(|scale| scale.ends.end - scale.ends.start);
-    let scale = ((WIDTH - y.left() - BESIDE[0]) / across).min(MAP_HEIGHT_MAX / up);
+    let scale = ((WIDTH - y.left() - RIGHT) / across).min(MAP_HEIGHT_MAX / up);
     let height = top + (up * scale).round() + BELOW + CAPTION;
     (height as u32, (WIDTH - y.left() - across * scale).round())
 }

@@ -4,7 +4,7 @@
 //! Logarithmic axes are linear in the logarithm and are given their key points, because those of `plotters` drop the lowest tick.
 
 use super::axes::{BELOW, Scale};
-use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, legend};
+use super::canvas::{COLOURS, EDGE, FONT, INK, RIGHT, SIZE, SYMBOL, WIDTH, legend};
 use super::map::{CAPTION, outline, paint, size};
 use super::{Figure, Kind, Provenance, Series};
 use bench::order::by_key;
@@ -56,7 +56,7 @@ pub fn svg(figure: &Figure) -> String {
     let (places, top) = legend(y.left(), &names);
     let (height, right) = match figure.map {
         Some(_) => size(&x, &y, top),
-        None => (if figure.is_flat { 560 } else { 1040 }, BESIDE[0]),
+        None => (if figure.is_flat { 560 } else { 1040 }, RIGHT),
     };
     let mut drawn = String::new();
     let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, height));
@@ -136,14 +136,13 @@ fn chart(
         let ticks = scale.ticks.iter().map(|(tick, _)| scale.place(*tick));
         scale.places().with_key_points(ticks.collect()).partial_axis(scale.places())
     };
-    let edge = BESIDE[1];
     let mut chart = ChartBuilder::on(page)
         .margin_top(top)
         .margin_right(right)
-        .margin_left(edge)
+        .margin_left(EDGE)
         .margin_bottom(if figure.map.is_some() { CAPTION } else { 0.0 })
         .x_label_area_size(BELOW)
-        .y_label_area_size(y.left() - edge)
+        .y_label_area_size(y.left() - EDGE)
         .build_cartesian_2d(axis(&x), axis(&y))
         .expect("the chart is smaller than the page");
     let (across, up) = (x.places(), y.places());

@@ -6,7 +6,7 @@
 use crate::figure::canvas::COLOURS;
 use contract::mesh::Leaf;
 use contract::word::Side;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The quantity that colours show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -19,16 +19,8 @@ pub enum Colour {
     Side,
 }
 
-/// The colour of one value.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
-    /// The value, as [`Colour::value`] returns it.
-    pub value: u32,
-    /// Its colour.
-    pub fill: [u8; 3],
-    /// Its name.
-    pub name: String,
-}
+/// The names and colours of values, as [`Colour::value`] returns them.
+pub type Key = BTreeMap<u32, (String, [u8; 3])>;
 
 /// Ranks that the legend names one by one.
 const RANKS_NAMED: usize = 16;
@@ -56,8 +48,8 @@ impl Colour {
         }
     }
 
-    /// The colours of the values that occur, in ascending order of the values.
-    pub fn key(self, values: &BTreeSet<u32>) -> Vec<Entry> {
+    /// The key to the values that occur.
+    pub fn key(self, values: &BTreeSet<u32>) -> Key {
         let finest = (values.len() - 1).max(1) as f64;
         let entry = |(i, &value): (usize, &u32)| {
             let side = Side::ALL[value as usize % 3];
@@ -68,17 +60,17 @@ impl Colour {
                 (Self::Side, Side::Inside) => (tint(COLOURS[5], 0.3), side.to_string()),
                 (Self::Side, Side::Crossing) => (COLOURS[6], side.to_string()),
             };
-            Entry { value, fill, name }
+            (value, (name, fill))
         };
         values.iter().enumerate().map(entry).collect()
     }
 
     /// The legend of a key: names with colours, and its title.
-    pub fn legend(self, key: &[Entry]) -> (Vec<(String, [u8; 3])>, String) {
+    pub fn legend(self, key: &Key) -> (Vec<(String, [u8; 3])>, String) {
         if self == Self::Rank && key.len() > RANKS_NAMED {
             return (Vec::new(), format!("{} ranks, coloured in turn", key.len()));
         }
-        (key.iter().map(|e| (e.name.clone(), e.fill)).collect(), self.name().to_owned())
+        (key.values().cloned().collect(), self.name().to_owned())
     }
 }
 
@@ -107,11 +99,12 @@ mod tests {
     #[test]
     fn finer_cells_are_darker_in_grey_too() {
         let key = Colour::Level.key(&(0..20).collect());
-        let grey = |e: &Entry| {
-            let [r, g, b] = e.fill.map(f64::from);
+        let grey = |(_, fill): &(String, [u8; 3])| {
+            let [r, g, b] = fill.map(f64::from);
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
-        assert!(key.windows(2).all(|w| grey(&w[0]) > grey(&w[1]) + 2.0), "{key:?}");
+        let greys: Vec<f64> = key.values().map(grey).collect();
+        assert!(greys.windows(2).all(|w| w[0] > w[1] + 2.0), "{key:?}");
     }
 
     /// A colour in CIE Lab, as seen with a matrix of colour vision on linear RGB.
@@ -162,9 +155,9 @@ mod tests {
     #[test]
     fn twenty_one_ranks_have_different_colours_and_many_ranks_have_no_names() {
         let key = Colour::Rank.key(&(0..21).collect());
-        let fills: BTreeSet<[u8; 3]> = key.iter().map(|e| e.fill).collect();
+        let fills: BTreeSet<[u8; 3]> = key.values().map(|(_, fill)| *fill).collect();
         assert_eq!(fills.len(), 21);
         assert_eq!(Colour::Rank.legend(&key).1, "21 ranks, coloured in turn");
-        assert_eq!(Colour::Rank.legend(&key[..3]).0.len(), 3);
+        assert_eq!(Colour::Rank.legend(&key.into_iter().take(3).collect()).0.len(), 3);
     }
 }

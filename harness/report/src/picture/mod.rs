@@ -8,7 +8,7 @@ mod squares;
 #[cfg(test)]
 mod tests;
 
-use colour::{Colour, Entry};
+use colour::{Colour, Key};
 use contract::case::Facet;
 use contract::failure::{Failure, Result};
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -20,7 +20,7 @@ use geometry::tree::{Aabb, Point, bounds};
 use squares::{SQUARES_MAX, Square, Squares};
 
 pub use crate::figure::format::format_of;
-use crate::figure::map::{Fill, Map};
+use crate::figure::map::{Fill, MAP_HEIGHT_MAX, Map};
 use crate::figure::{Axis, Figure, svg};
 
 /// A point in a plane: to the right, and upwards.
@@ -47,14 +47,14 @@ pub struct Picture {
     /// Minimum and maximum corner of what is shown, in the plane and in the user's units.
     window: [Planar; 2],
     squares: Squares,
-    /// The colours of their values.
-    key: Vec<Entry>,
+    /// The key to their values.
+    key: Key,
     /// The segments in which the plane cuts the body, if it is known, in the plane and in the user's units.
     section: Option<Vec<[Planar; 2]>>,
 }
 
 /// Units of the page that a map may take: its width, but for labels, and its greatest height.
-const PAGE: [f64; 2] = [1360.0, 1650.0];
+const PAGE: [f64; 2] = [1360.0, MAP_HEIGHT_MAX];
 /// Why a picture would be empty.
 const NO_LEAF: &str =
     "no leaf of the selection is in a slice: give another --slice or a larger --clip";
@@ -170,7 +170,7 @@ impl Picture {
             let [from, to] = self.corners(square);
             let is_shown = |i: usize| from[i] < high[i] + slack && to[i] > low[i] - slack;
             assert!((0..2).all(is_shown), "{square:?} is outside of {:?}", self.window);
-            assert!(self.key.iter().any(|e| e.value == square.value), "{square:?} has no colour");
+            assert!(self.key.contains_key(&square.value), "{square:?} has no colour");
         }
         let is_within =
             |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
@@ -190,7 +190,7 @@ impl Picture {
         let mut fills = vec![Fill { colour: [255; 3], is_outlined: false, cells }];
         // Outlined squares are last, so that no fill covers half of an outline.
         for is_outlined in [false, true] {
-            fills.extend(self.key.iter().map(|entry| self.fill(entry, is_outlined)));
+            fills.extend(self.key.keys().map(|value| self.fill(*value, is_outlined)));
         }
         fills.retain(|fill| !fill.cells.is_empty());
         let (key, title) = self.colour.legend(&self.key);
@@ -203,9 +203,9 @@ impl Picture {
     }
 
     /// The visible parts of the squares of one value, with or without outlines.
-    fn fill(&self, entry: &Entry, is_outlined: bool) -> Fill {
+    fn fill(&self, value: u32, is_outlined: bool) -> Fill {
         let is_shown = |s: &&Square| {
-            s.value == entry.value && (s.level <= self.squares.level_outlined) == is_outlined
+            s.value == value && (s.level <= self.squares.level_outlined) == is_outlined
         };
         let visible = |square: &Square| {
             let within =
@@ -214,7 +214,7 @@ impl Picture {
             (low[0] < high[0] && low[1] < high[1]).then_some([low, high])
         };
         let cells = self.squares.squares.iter().filter(is_shown).filter_map(visible).collect();
-        Fill { colour: entry.fill, is_outlined, cells }
+        Fill { colour: self.key[&value].1, is_outlined, cells }
     }
 
     /// One sentence on what the picture shows.

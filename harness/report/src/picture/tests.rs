@@ -148,7 +148,7 @@ fn a_clip_box_is_the_window() {
     let shown = Request { selection, ..request(Colour::Level) };
     let picture = Picture::collect(&mesh, &shown).unwrap();
     assert_eq!(picture.window, [[0.0, 0.0], [4.0, 2.0]]);
-    assert_eq!((picture.squares.leaves, picture.key[0].name.as_str()), (2, "2"));
+    assert_eq!((picture.squares.leaves, picture.key[&2].0.as_str()), (2, "2"));
 }
 
 proptest! {
@@ -257,7 +257,7 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
 fn planted_wrong_pictures_are_noticed() {
     assert_noticed("not within the root", |p| p.window[1][0] = 9.0);
     assert_noticed("is outside of", |p| p.window = [[6.0; 2], [8.0; 2]]);
-    assert_noticed("has no colour", |p| p.key.truncate(1));
+    assert_noticed("has no colour", |p| _ = p.key.pop_last());
     assert_noticed("leaves [", |p| {
         p.section.as_mut().expect("the body is known")[0][0][1] = -5.0;
     });
