@@ -80,7 +80,7 @@ impl EngineArguments {
     ///
     /// # Errors
     /// If the engine is not known.
-    pub fn find(&self) -> Result<Programs, String> {
+    pub fn find(&self) -> Result<Programs> {
         Programs::find(&self.engine, &self.programs)
     }
 }

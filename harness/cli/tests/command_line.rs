@@ -91,6 +91,9 @@ fn why_answers_for_a_directory() {
     write_mesh(vec![0], Path::new(&least));
     let answer = printed(&["why", &least, "-0.5,0,0.25"]);
     assert!(answer.contains("lies in the outside leaf octant root (level 0)"), "{answer}");
+    let audit = harness(&["audit", &least, "--timeout", "9"]);
+    let message = String::from_utf8(audit.stderr).unwrap();
+    assert!(message.contains("has a manifest") && audit.status.code() == Some(2), "{message}");
     let nowhere = place.path().to_str().unwrap();
     for wrong in [&[&least[..], "9,0,0"][..], &[&least, "1,2"], &[&least], &[nowhere, "0,0,0"]] {
         let output = harness(&[&["why"], wrong].concat());

@@ -4,6 +4,7 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
+use crate::failure::{Failure, Result};
 use crate::files;
 use serde::Deserialize;
 use std::fs;
@@ -25,10 +26,10 @@ impl PlainCase {
     ///
     /// # Errors
     /// One sentence, if it is not a valid case.
-    pub fn read(path: &Path) -> Result<Self, String> {
-        let case = Case::read(path).map_err(|error| error.to_string())?;
-        let text = files::read_text(path).map_err(|error| error.to_string())?;
-        let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    pub fn read(path: &Path) -> Result<Self> {
+        let case = Case::read(path)?;
+        let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
+        let mut table: Table = toml::from_str(&text).map_err(|why| Failure::about(path, why))?;
         table.retain(|key, _| !["geometry", "generator", "root_scale"].contains(&key));
         let root = Value::try_from(case.root).expect("a root is representable in TOML");
         table.insert("root".into(), root);

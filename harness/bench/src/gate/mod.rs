@@ -167,6 +167,6 @@ impl Bench<'_> {
     /// Returns the file of a case in a form that an engine reads.
     fn prepare(&self, engine: &Engine, case: &GateCase, name: &str) -> Result<PathBuf, Ended> {
         let place = emptied(self.place.join(name), engine)?.join("case");
-        engine.prepare(&case.file, &place).map_err(|why| engine.unusable(why))
+        engine.prepare(&case.file, &place).map_err(|failure| engine.unusable(failure.why))
     }
 }

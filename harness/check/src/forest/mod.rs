@@ -16,7 +16,7 @@ mod tests;
 use crate::audit::AuditReport;
 use crate::checks::{CheckResult, NO_LEAVES};
 use crate::promises::Touching;
-use contract::import::forest::{Forest, LENGTHS, Quadrant};
+use contract::import::forest::{Forest, Quadrant};
 use isometry::LENGTH;
 use std::time::Instant;
 use topology::Topology;
@@ -44,22 +44,11 @@ fn key(dimension: usize, point: [i64; 3]) -> u128 {
     (0..LENGTH.trailing_zeros() as usize).map(of_bit).sum()
 }
 
-/// The length of a tree, which is that of the version of p4est: most quadrants are octants of such trees.
-fn length(forest: &Forest) -> i64 {
-    let dimension = forest.connectivity.dimension;
-    let fitting = |&length: &i64| {
-        forest.leaves.iter().flatten().filter_map(|q| leaf(dimension, length, q)).count()
-    };
-    LENGTHS.into_iter().max_by_key(fitting).expect("three lengths")
-}
-
-/// A quadrant in a tree of this length; `None` if it is not an octant of a level that p4est allows.
+/// A quadrant in a tree of this length; `None` if it is not an octant.
 fn leaf(dimension: usize, length: i64, quadrant: &Quadrant) -> Option<Leaf> {
-    let level = u32::try_from(quadrant.level).ok().filter(|&l| l < length.trailing_zeros())?;
     let corner = quadrant.corner.map(|at| i64::from(at) * (LENGTH / length));
-    let leaf = Leaf { corner, level, key: 0 };
-    let fits = |&at: &i64| (0..LENGTH).contains(&at) && at % leaf.size() == 0;
-    corner.iter().all(fits).then(|| Leaf { key: key(dimension, corner), ..leaf })
+    let leaf = || Leaf { corner, level: quadrant.level as u32, key: key(dimension, corner) };
+    quadrant.is_octant(length).then(leaf)
 }
 
 /// A quadrant as findings name it.
@@ -72,7 +61,7 @@ fn named(tree: usize, index: usize, quadrant: &Quadrant) -> String {
 fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
     let [mut valid, mut linear, mut complete] =
         ["valid", "linear", "complete"].map(CheckResult::new);
-    let (dimension, length) = (forest.connectivity.dimension, length(forest));
+    let (dimension, length) = (forest.connectivity.dimension, forest.length());
     let mut all = Vec::new();
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
         let (mut next, mut leaves) = (0, Vec::with_capacity(quadrants.len()));

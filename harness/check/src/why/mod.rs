@@ -17,6 +17,7 @@
 use std::cell::RefCell;
 
 use contract::case::Case;
+use contract::failure::{Failure, Result};
 use contract::manifest::{self, Geometry, Manifest};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Tree};
@@ -33,22 +34,19 @@ mod gradation;
 ///
 /// # Errors
 /// One sentence, if the case is not that of the mesh, or if its T0 is too large.
-pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth, String> {
+pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth> {
     let geometry = Some(Geometry::of(&case.facets_lattice));
     let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
-    let differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
-    if of_mesh.sides == manifest::Sides::Unknown {
-        return Err("the sides of the mesh are unknown, and the answer needs them".to_owned());
-    }
-    if !differing.is_empty() {
-        return Err(format!(
-            "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
-            differing.join("; ")
-        ));
-    }
+    let why = "the sides of the mesh are unknown, and the answer needs them";
+    Failure::unless(of_mesh.sides == manifest::Sides::Known, why)?;
+    let differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs)).join("; ");
+    let why = format!(
+        "the mesh was made from other inputs than the case ({differing}); give the case file from which it was made"
+    );
+    Failure::unless(differing.is_empty(), why)?;
     let most = Truth::LEAVES_MAX;
-    let too_large = || format!("T0 of the case has more than {most} leaves: omit --case");
-    Truth::of(case, &inputs).ok_or_else(too_large)
+    let why = format!("T0 of the case has more than {most} leaves: omit --case");
+    Truth::of(case, &inputs).ok_or(Failure::input(why))
 }
 
 /// A split that no rule requires.

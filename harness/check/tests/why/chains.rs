@@ -199,7 +199,7 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     assert!(why.contains("outside the root"), "{why}");
     let mut other = correct.case.clone();
     other.rules.layer_cells_min += 1;
-    let why = why::body(&other, &correct.mesh.manifest).unwrap_err();
+    let why = why::body(&other, &correct.mesh.manifest).unwrap_err().why;
     let n = other.layer_cells_min;
     let expected = format!(
         "the mesh was made from other inputs than the case (layer_cells_min: {} in the mesh; {n} in the case); give the case \
@@ -208,7 +208,7 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     );
     assert_eq!(why, expected);
     correct.mesh.manifest.sides = contract::manifest::Sides::Unknown;
-    let why = why::body(&correct.case, &correct.mesh.manifest).unwrap_err();
+    let why = why::body(&correct.case, &correct.mesh.manifest).unwrap_err().why;
     assert_eq!(why, "the sides of the mesh are unknown, and the answer needs them");
 }
 

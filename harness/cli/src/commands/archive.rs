@@ -174,8 +174,8 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
 fn leave_out_missing(study: &mut Study) -> Result<()> {
     let paths = Paths::find();
     for name in study.engines().iter().filter(|name| !is_own(name)) {
-        let engine = Engine::find(name, None, &paths).map_err(Failure::from);
-        if let Err(Failure { why, .. }) = engine.and_then(|engine| engine.require()) {
+        let engine = Engine::find(name, None, &paths).and_then(|engine| engine.require());
+        if let Err(Failure { why, .. }) = engine {
             eprintln!("harness: the runs of {name} are left out: {why}");
             study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
         }

@@ -114,11 +114,11 @@ fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8> {
 }
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.
-fn promising(text: &str) -> Result<Description, String> {
+fn promising(text: &str) -> Result<Description> {
+    let example = "for example 'complete = true, balance = \"face\"'";
+    let wrong = |why| Failure::input(format!("--promises '{text}': {why}; {example}"));
     match text.contains('=') && !text.ends_with(".toml") {
-        true => Description::parse(&format!("promises = {{ {text} }}")).map_err(|why| {
-            format!("--promises '{text}': {why}; for example 'complete = true, balance = \"face\"'")
-        }),
+        true => Description::parse(&format!("promises = {{ {text} }}")).map_err(wrong),
         false => Description::find(text, &Paths::find()),
     }
 }

@@ -67,8 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         false => measure(arguments, study, &record)?,
     };
     if let Some(directory) = report {
-        let written = super::report::write(directory, arguments.record.as_slice());
-        written.map_err(|why| unwritten(code)(why.into()))?;
+        super::report::write(directory, arguments.record.as_slice()).map_err(unwritten(code))?;
     }
     Ok(code)
 }

@@ -44,9 +44,9 @@ pub struct Source {
     /// What x, y and z are in a table
     #[arg(long, value_enum, default_value_t)]
     position: Position,
-    /// Time limit of a reader in Python
-    #[arg(long, value_name = "SECONDS", default_value = "3600", value_parser = whole_seconds)]
-    timeout: Duration,
+    /// Time limit of a reader in Python [default: 3600]
+    #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
+    timeout: Option<Duration>,
 }
 
 impl Source {
@@ -60,9 +60,10 @@ impl Source {
     /// # Errors
     /// If any is given.
     pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
-        let is_given = self.format.is_some() || self.describes_cells();
+        let is_read = self.format.is_some() || self.timeout.is_some();
+        let is_given = is_read || self.describes_cells();
         let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
-        let why = "has a manifest, which states root and sides: omit the options for them";
+        let why = "has a manifest, which states root and sides: omit the options for reading it";
         Failure::unless(is_used, format!("{} {why}", meshes[0].display()))
     }
 
@@ -92,7 +93,8 @@ impl Source {
         let sides = self.sides.clone();
         let request = Request { sides, root, position, ..Request::default() };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let mut imported = import(mesh, format, &request, case, program, timeout)?;
+        let limit = timeout.unwrap_or(Duration::from_secs(3600));
+        let mut imported = import(mesh, format, &request, case, program, limit)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(

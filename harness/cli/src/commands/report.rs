@@ -86,14 +86,13 @@ fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
 ///
 /// # Errors
 /// One sentence, if a record cannot be read, or the report cannot be written.
-pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String> {
+pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>> {
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let lines = read(&records)?;
-    if lines.is_empty() {
-        let place = given.first().map_or(directory, PathBuf::as_path).display();
-        return Err(format!("no results to report: {place} has none; harness bench makes them"));
-    }
-    let written = report(directory, &lines).map_err(|error| error.to_string())?;
+    let place = given.first().map_or(directory, PathBuf::as_path).display();
+    let why = format!("no results to report: {place} has none; harness bench makes them");
+    Failure::unless(!lines.is_empty(), why)?;
+    let written = report(directory, &lines)?;
     written.notes.iter().for_each(|note| println!("{note}"));
     written.broken.iter().for_each(|(rule, why)| println!("rule {rule} broken: {why}"));
     if !cfg!(feature = "figures") {
@@ -104,11 +103,11 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
 }
 
 /// Reads records, and says which lines it cannot read. A line that is there twice, as in a copy of a record, is one result.
-pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
+pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>> {
     let (mut all, mut known) = (Vec::new(), HashSet::new());
     for path in records {
         let shown = path.display();
-        let (mut read, broken) = entry::read(path).map_err(|error| format!("{shown}: {error}"))?;
+        let (mut read, broken) = entry::read(path).map_err(|error| Failure::at(path, error))?;
         for (line, why) in broken {
             eprintln!("harness: {shown}, line {line} is skipped: {why}");
         }
@@ -127,15 +126,14 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
 }
 
 /// The records in a directory; other files of JSON lines, such as a history, are none.
-pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
-    let entries = std::fs::read_dir(directory)
-        .map_err(|error| format!("{}: {error}", directory.display()))?;
+pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(directory).map_err(|error| Failure::at(directory, error))?;
     let has_schema = |text: Vec<u8>| text.windows(13).any(|part| part == b"octree-bench/");
     let mut found = Vec::new();
     for path in entries.flatten().map(|entry| entry.path()) {
-        let named = |error| format!("{}: {error}", path.display());
         let is_of_lines = path.extension().is_some_and(|ending| ending == "jsonl");
-        if is_of_lines && has_schema(files::read_log(&path).map_err(named)?) {
+        let read = || files::read_log(&path).map_err(|error| Failure::at(&path, error));
+        if is_of_lines && has_schema(read()?) {
             found.push(path);
         }
     }

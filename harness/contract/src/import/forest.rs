@@ -18,7 +18,7 @@ const FORMAT_PLANE: u64 = 0x0200_0009;
 /// `P8EST_ONDISK_FORMAT`.
 pub const FORMAT: u64 = 0x0300_0009;
 /// Lengths of a tree in integer coordinates, in the versions of p4est.
-pub const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
+const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
 /// Header and quadrants begin at multiples of this number of bytes.
 pub const ALIGNMENT: usize = 32;
 
@@ -69,6 +69,15 @@ pub struct Quadrant {
     pub data: u8,
 }
 
+impl Quadrant {
+    /// Whether it is an octant, of a level that p4est allows, of a tree of this length.
+    pub fn is_octant(&self, length: i64) -> bool {
+        let is_multiple = |at: i32, edge| (0..length).contains(&at.into()) && at % edge == 0;
+        (0..length.trailing_zeros() as i32).contains(&self.level)
+            && self.corner.iter().all(|&at| is_multiple(at, (length >> self.level) as i32))
+    }
+}
+
 /// A forest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forest {
@@ -81,6 +90,13 @@ pub struct Forest {
 }
 
 impl Forest {
+    /// The length of a tree, which is that of the version of p4est: most quadrants are octants of such trees.
+    pub fn length(&self) -> i64 {
+        let all = || self.leaves.iter().flatten();
+        let fitting = |&length: &i64| all().filter(|quadrant| quadrant.is_octant(length)).count();
+        LENGTHS.into_iter().max_by_key(fitting).expect("three lengths")
+    }
+
     /// Whether the mesh is an oct-tree in one root.
     pub fn is_one_cube(&self) -> bool {
         let Connectivity { dimension, trees, tree_to_tree, tree_to_face, edges, corners, .. } =

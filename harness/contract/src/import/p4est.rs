@@ -7,11 +7,11 @@
 //! attribute of its only tree, if it has one, is the edge of the root to the last bit.
 
 use super::cells::Cells;
-use super::forest::{self, Connectivity, LENGTHS, Quadrant, damaged};
+use super::forest::{self, Connectivity, Quadrant, damaged};
 use super::{Request, side};
 use crate::failure::{Failure, Result};
 use crate::lattice::Root;
-use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use crate::word;
 
 use std::path::Path;
@@ -54,13 +54,14 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
         "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
     );
     Failure::unless(!request.is_root_of_case || stated == Root::UNIT || is_there, why)?;
-    let scale = placed.edge / stated.edge;
+    let (scale, length) = (placed.edge / stated.edge, forest.length());
     let sides = with_sides.then(Vec::new);
     let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
-        let corner = [0, 1, 2]
-            .map(|a| placed.origin[a] + (trees.corners[tree][a] - stated.origin[a]) * scale);
-        add_tree(quadrants, &Root { origin: corner, edge: trees.edges[tree] * scale }, &mut cells)?;
+        let offset = |a: usize| (trees.corners[tree][a] - stated.origin[a]) * scale;
+        let origin = [0, 1, 2].map(|a| placed.origin[a] + offset(a));
+        let tree = Root { origin, edge: trees.edges[tree] * scale };
+        add_tree(quadrants, length, &tree, &mut cells)?;
     }
     Ok(cells)
 }
@@ -102,41 +103,28 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells> {
 }
 
 /// Adds the quadrants of a tree, which are complete: each begins where the one before it ends, on the Morton curve.
-fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<()> {
-    let Some(last) = quadrants.last() else { return Err(damaged("a tree has no quadrants")) };
-    let ends_there = |&length: &i64| {
-        let edge = length.checked_shr(last.level.try_into().ok()?)?;
-        last.corner.iter().all(|&at| i64::from(at) + edge == length).then_some(length)
-    };
-    let length = LENGTHS.iter().find_map(ends_there).ok_or_else(|| {
-        damaged(&format!(
-            "the last quadrant of a tree, {last:?}, does not end in the tree's last corner"
-        ))
-    })?;
+fn add_tree(quadrants: &[Quadrant], length: i64, tree: &Root, cells: &mut Cells) -> Result<()> {
     let mut next = 0;
-    for &Quadrant { corner, level, data } in quadrants {
-        let octant =
-            u8::try_from(level).ok().filter(|&level| level <= LEVEL_MAX).and_then(|level| {
-                let fits = |&at: &i32| {
-                    (0..length).contains(&i64::from(at)) && i64::from(at) % (length >> level) == 0
-                };
-                let cell = |at: i32| (i64::from(at) * i64::from(CELLS_PER_EDGE) / length) as u32;
-                corner.iter().all(fits).then(|| Octant { corner: corner.map(cell), level })
-            });
-        let octant = octant.filter(|octant| word::key_of(octant.corner) == next).ok_or_else(|| {
-            damaged(&format!(
+    for quadrant in quadrants {
+        let &Quadrant { corner, level, data } = quadrant;
+        let cell = corner.map(|at| (i64::from(at) * i64::from(CELLS_PER_EDGE) / length) as u32);
+        let is_octant = quadrant.is_octant(length) && level <= i32::from(LEVEL_MAX);
+        if !is_octant || word::key_of(cell) != next {
+            return Err(damaged(&format!(
                 "the quadrant with the corner {corner:?} and the level {level} is not an octant of level 0 to \
                  {LEVEL_MAX} that begins where the one before it ends"
-            ))
-        })?;
-        next += word::span(octant.level);
+            )));
+        }
+        let level = level as u8;
+        next += word::span(level);
         match (&mut cells.sides, data) {
             (Some(_), FILLER) => continue,
             (Some(sides), code) => sides.push(side(f64::from(code), cells.edges.len())?),
             (None, _) => {}
         }
         let along = corner.map(|c| f64::from(c) / length as f64 * tree.edge);
-        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), tree.edge_of(octant.level));
+        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), tree.edge_of(level));
     }
-    Ok(())
+    let why = "the last quadrant of a tree does not end in the tree's last corner";
+    Failure::unless(next == word::KEY_END, damaged(why))
 }

@@ -8,11 +8,11 @@ use super::paths::Paths;
 use super::templates::{Templates, Values};
 use check::promises::{Independence, Promises, Touching};
 use contract::case::{Case, explain};
+use contract::failure::{Failure, Result};
 use contract::manifest::{Enclosed, Keep};
 use contract::octant::LEVEL_MAX;
 use contract::plain::StlForm;
 use serde::Deserialize;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// Our own engine files, which belong to the version of the harness.
@@ -137,35 +137,35 @@ impl Description {
     ///
     /// # Errors
     /// One sentence, if the file is missing or wrong.
-    pub fn find(name: &str, paths: &Paths) -> Result<Self, String> {
+    pub fn find(name: &str, paths: &Paths) -> Result<Self> {
         let engines = paths.root.join("harness/engines");
         let path = match name.ends_with(".toml") {
             true => PathBuf::from(name),
             false => engines.join(format!("{name}.toml")),
         };
-        let wrong = |why: String| format!("{}: {why}", path.display());
         let text = match OWN.iter().find(|(own, _)| *own == name) {
             Some((_, text)) => (*text).to_owned(),
-            None => contract::files::read_text(&path).map_err(|error| {
-                let engines = engines.display();
-                let hint = format!(": give a name in {engines}, or a path that ends in .toml");
-                let is_missing = error.kind() == io::ErrorKind::NotFound;
-                wrong(format!("{error}{}", if is_missing { hint } else { String::new() }))
-            })?,
+            None => {
+                let (file, engines) = (path.display(), engines.display());
+                let why = format!("give a name in {engines}, or a path that ends in .toml");
+                Failure::unless(path.exists(), format!("{file} does not exist: {why}"))?;
+                contract::files::read_text(&path).map_err(|error| Failure::at(&path, error))?
+            }
         };
         let here = path.parent().unwrap_or(Path::new(""));
         let here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
-        Ok(Self { name: name.to_owned(), here, ..Self::parse(&text).map_err(wrong)? })
+        let parsed = Self::parse(&text).map_err(|why| why.of_file(&path))?;
+        Ok(Self { name: name.to_owned(), here, ..parsed })
     }
 
     /// Parses an engine file.
     ///
     /// # Errors
     /// One sentence, if it is wrong.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> Result<Self> {
         let mut description: Self =
             toml::from_str(text).map_err(|error| explain(text, &error, &EXAMPLES))?;
-        description.promises.fault().map_or(Ok(()), Err)?;
+        description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
         if let Some(first) = templates.serial.first().cloned() {
             templates.check_placeholders()?;
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(least.run.serial, ["{program}", "{case}", "{out}"]);
         assert_eq!(least.run.parallel[1], "{program}");
         assert!(least.run.always_writes_mesh() && least.promises.definition);
-        let nowhere = Description::parse("[run]\nserial = ['meshit', '{case}']").unwrap_err();
+        let nowhere = Description::parse("[run]\nserial = ['meshit', '{case}']").unwrap_err().why;
         assert!(nowhere.contains("`serial` has no {out}"), "{nowhere}");
     }
 
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn errors_name_the_invalid_key_or_placeholder() {
-        let why = |text: &str| Description::parse(text).unwrap_err();
+        let why = |text: &str| Description::parse(text).unwrap_err().why;
         let unknown = why(&LEAST.replace("{case}", "{cas}"));
         assert!(unknown.contains("`serial` has the unknown placeholder {cas}"), "{unknown}");
         assert!(why(&LEAST.replace("'{case}'", "'{launcher}'")).contains("{launcher}"));
@@ -299,10 +299,10 @@ mod tests {
             ))
         };
         for of in ["ranks", "partitioner"] {
-            assert!(with(of, "").unwrap_err().contains("with which to vary it"), "{of}");
+            assert!(with(of, "").unwrap_err().why.contains("with which to vary it"), "{of}");
         }
         assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
-        let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err();
+        let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err().why;
         assert!(empty.contains("[promises] is empty"), "{empty}");
     }
 

@@ -10,7 +10,7 @@ use super::service::{self, Services};
 use super::templates::{LAUNCHER, Values, fill};
 use crate::import;
 use clap::Args;
-use contract::failure::named;
+use contract::failure::{Failure as Refusal, named};
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
 use contract::plain::{PlainCase, StlForm};
@@ -50,13 +50,11 @@ impl Engine {
     ///
     /// # Errors
     /// One sentence, if the engine file is missing or wrong, or if the command writes one of the engine's files.
-    pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, String> {
+    pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, Refusal> {
         let description = Description::find(name, paths)?;
-        if description.run.serial.is_empty() {
-            return Err(format!(
-                "{name} cannot be run: its engine file has no command `serial` in [run], as in serial = [\"my-mesher\", \"{{case}}\", \"{{out}}\"]"
-            ));
-        }
+        let why = "its engine file has no command `serial` in [run], as in serial = [\"my-mesher\", \"{case}\", \"{out}\"]";
+        let why = format_args!("{name} cannot be run: {why}");
+        Refusal::unless(!description.run.serial.is_empty(), why)?;
         let places = description.places(paths);
         let program = match given {
             // A name without a slash would be searched for on the PATH. A link may lead to a program that behaves by its own name.
@@ -70,7 +68,7 @@ impl Engine {
         let launcher = Launcher::mpirun(&paths.mpirun);
         let engine = Self { description, program, is_given: given.is_some(), places, launcher };
         for file in engine.files() {
-            files::register_input(&file).map_err(|error| named(&file, &error).to_string())?;
+            files::register_input(&file).map_err(|error| Refusal::at(&file, error))?;
         }
         Ok(engine)
     }
@@ -105,7 +103,7 @@ impl Engine {
     ///
     /// # Errors
     /// What to do about it.
-    pub fn require(&self) -> Result<(), contract::failure::Failure> {
+    pub fn require(&self) -> Result<(), Refusal> {
         let (name, path) = (self.name(), self.program.display());
         let option = if name == "reference" { name } else { "mesher" };
         let first = fill(&self.description.run.serial[0], &self.places);
@@ -119,7 +117,7 @@ impl Engine {
                 "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
             ),
         };
-        Err(contract::failure::Failure::missing(why))
+        Err(Refusal::missing(why))
     }
 
     /// Why no run on MPI can be started; `None` if one can.
@@ -145,12 +143,12 @@ impl Engine {
     ///
     /// # Errors
     /// If the case cannot be read or the other one cannot be written.
-    pub fn prepare(&self, case: &Path, directory: &Path) -> Result<PathBuf, String> {
+    pub fn prepare(&self, case: &Path, directory: &Path) -> Result<PathBuf, Refusal> {
         let takes = &self.description.takes;
         if takes.generator && takes.stl == StlForm::Any {
             return Ok(case.to_owned());
         }
-        PlainCase::read(case)?.write(directory, takes.stl).map_err(|error| error.to_string())
+        Ok(PlainCase::read(case)?.write(directory, takes.stl)?)
     }
 
     /// The values of the placeholders that do not depend on a run.
@@ -372,7 +370,7 @@ impl Programs {
     ///
     /// # Errors
     /// One sentence, if an engine file is missing or wrong.
-    pub fn find(name: &str, given: &Given) -> Result<Self, String> {
+    pub fn find(name: &str, given: &Given) -> Result<Self, Refusal> {
         let paths = Paths::find();
         let engine = Engine::find(name, given.mesher.as_deref(), &paths)?;
         let mesher = match name {

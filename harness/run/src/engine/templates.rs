@@ -3,6 +3,7 @@
 use super::failure::End;
 use super::layout::{Launcher, Layout, Ranks, RunOptions};
 use check::promises::{Independence, Promises};
+use contract::failure::{Failure, Result};
 use contract::import::{Format, Position};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -78,32 +79,23 @@ impl Templates {
     }
 
     /// Refuses promises that no command could show to be kept.
-    pub(super) fn check_promises(&self, promises: &Promises) -> Result<(), String> {
+    pub(super) fn check_promises(&self, promises: &Promises) -> Result<()> {
         let on_sides = promises.definition || promises.crossing || promises.sides.is_some();
-        if self.format.is_some() && self.sides.is_none() && on_sides {
-            return Err(
-                "the promises include sides (`definition` does, which is assumed without [promises]), but [run] names no cell array \
-                 for them: add it, as in sides = \"side\", or promise less, as in balance = \"face\""
-                    .to_owned(),
-            );
-        }
-        let lacks = |of, keys: [&[String]; 2]| {
-            promises.independent_of.contains(&of) && keys.concat().is_empty()
+        let why = "the promises include sides (`definition` does, which is assumed without [promises]), but [run] names no cell array \
+             for them: add it, as in sides = \"side\", or promise less, as in balance = \"face\"";
+        Failure::unless(self.format.is_none() || self.sides.is_some() || !on_sides, why)?;
+        let varies = |of, keys: [&[String]; 2]| {
+            !promises.independent_of.contains(&of) || !keys.concat().is_empty()
         };
-        let what = match () {
-            () if lacks(Independence::Ranks, [&self.parallel, &self.simulated]) => {
-                "ranks, but [run] has neither `parallel` nor `simulated`"
-            }
-            () if lacks(Independence::Partitioner, [&self.partitioner, &self.level_base]) => {
-                "partitioner, but [run] has neither `partitioner` nor `level_base`"
-            }
-            () => return Ok(()),
-        };
-        Err(format!("`independent_of` names {what} with which to vary it"))
+        let why = "`independent_of` names ranks, but [run] has neither `parallel` nor `simulated` with which to vary it";
+        Failure::unless(varies(Independence::Ranks, [&self.parallel, &self.simulated]), why)?;
+        let why = "`independent_of` names partitioner, but [run] has neither `partitioner` nor `level_base` with which to vary it";
+        let keys: [&[String]; 2] = [&self.partitioner, &self.level_base];
+        Failure::unless(varies(Independence::Partitioner, keys), why)
     }
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
-    pub(super) fn check_placeholders(&self) -> Result<(), String> {
+    pub(super) fn check_placeholders(&self) -> Result<()> {
         // A command that contains {out} needs no template that appends it.
         let needs_out = self.out.is_empty();
         for (key, template) in self.commands().into_iter().filter(|(_, of)| !of.is_empty()) {
@@ -113,15 +105,14 @@ impl Templates {
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
             check_known(key, &words.cloned().collect::<Vec<_>>(), &own)?;
             let has = |text: &str| template.iter().any(|word| word.contains(text));
-            if key == "parallel" && !self.serve.is_empty() && !has("{program}") {
-                return Err("`serve` needs the word {program} in `parallel`".to_owned());
-            }
-            if needs_out && !has("{out}") {
-                return Err(format!(
-                    "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
-                     key `out`, as in out = [\"--out\", \"{{out}}\"]"
-                ));
-            }
+            let is_served = key == "parallel" && !self.serve.is_empty();
+            let why = "`serve` needs the word {program} in `parallel`";
+            Failure::unless(!is_served || has("{program}"), why)?;
+            let why = format!(
+                "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
+                 key `out`, as in out = [\"--out\", \"{{out}}\"]"
+            );
+            Failure::unless(!needs_out || has("{out}"), why)?;
         }
         check_known("serve", &self.serve, &[])?;
         let mut appended = self.appended().into_iter();
@@ -186,12 +177,14 @@ impl Templates {
 }
 
 /// Refuses placeholders of a template that have no value in it.
-fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<(), String> {
+fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<()> {
     let known = [&COMMON, own].concat();
     let mut named = words.iter().flat_map(|word| placeholders(word));
     named.find(|name| !known.contains(name)).map_or(Ok(()), |name| {
         let known = known.join(" ");
-        Err(format!("`{key}` has the unknown placeholder {{{name}}}; known there are {known}"))
+        let why =
+            format!("`{key}` has the unknown placeholder {{{name}}}; known there are {known}");
+        Err(Failure::input(why))
     })
 }
 

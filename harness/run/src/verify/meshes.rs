@@ -185,15 +185,12 @@ impl CaseRun<'_> {
     /// A run for time and memory, which writes no mesh if the engine can do without.
     fn measure(&mut self) -> Option<Run> {
         self.step("serial, timed");
-        let timed =
-            self.run(&self.file, "timed", MESHER, None, &SERIAL).and_then(|(mut run, _)| {
-                if run.digest.is_empty() {
-                    // Only the mesh of another run can show what such a run makes.
-                    run.digest =
-                        self.mesh(&self.file, "timed", MESHER, Tree::Final, &SERIAL)?.run.digest;
-                }
-                Ok(run)
-            });
+        let run = |tree| self.run(&self.file, "timed", MESHER, tree, &SERIAL).map(|(run, _)| run);
+        // Only the mesh of another run can show what a run without a digest makes.
+        let timed = run(None).and_then(|timed| match timed.digest.is_empty() {
+            true => Ok(Run { digest: run(Some(Tree::Final))?.digest, ..timed }),
+            false => Ok(timed),
+        });
         let timed = timed.map_err(|failure| self.add_failure("serial", None, &failure)).ok()?;
         self.report.cells = timed.cells;
         self.report.runs.push(timed.clone());
