@@ -3,7 +3,7 @@
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Keep;
 use contract::number::number;
-use contract::octant::CELLS_PER_EDGE;
+use contract::octant::LEVEL_MAX;
 use serde::Serialize;
 
 use super::input::Input;
@@ -181,7 +181,7 @@ pub fn at_root(input: &Input, first: usize) -> [Finding; 2] {
 pub fn meaning(finding: &Finding, input: &Input) -> String {
     let (_, meaning) = finding.kind.row();
     let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
-    let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
+    let finest = input.case.root.edge_of(LEVEL_MAX);
     match finding.kind {
         Kind::Openings if width < finest => {
             "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
@@ -222,6 +222,7 @@ mod tests {
     use super::*;
     use crate::input::Requested;
     use contract::lattice::Root;
+    use contract::octant::CELLS_PER_EDGE;
 
     /// The root's finest cell is 1 wide, and with a spacing the cells at the surface are 4.
     fn input(with_cell: bool) -> Input {

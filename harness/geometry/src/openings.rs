@@ -8,7 +8,7 @@
 //! A ball that is wider does not pass through a flat opening.
 
 use contract::lattice::UNITS_PER_EDGE;
-use contract::octant::CELLS_PER_EDGE;
+use contract::octant::LEVEL_MAX;
 use contract::sets::Sets;
 
 use super::edges::{Edges, Use};
@@ -38,7 +38,7 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     let width = |place: &Place| place.width.unwrap_or(0.0);
     places.sort_by(|(a, _), (b, _)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
     // Without a spacing, any may be chosen, up to the finest.
-    let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
+    let finest = input.case.root.edge_of(LEVEL_MAX);
     let leaks =
         |(place, extent): &&(Place, Aabb)| width(place) >= input.cell_in(extent).unwrap_or(finest);
     Finding {

@@ -71,7 +71,7 @@ impl Base {
         Ok(Self {
             name,
             stem,
-            spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
+            spacing_min: case.root.edge_of(case.level_surface),
             layer_cells_min: case.layer_cells_min,
             inputs: digest_of([rules, stl]),
             table,
