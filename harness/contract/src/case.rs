@@ -87,7 +87,7 @@ impl Case {
             _ => return Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
         };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { solids, ..Self::build(name, &file, facets).map_err(wrong)? })
+        Ok(Self { solids, ..Self::build(name, &file, facets).map_err(|why| why.of_file(path))? })
     }
 
     /// A case from the text of a case file without geometry, and from a body in memory.
@@ -96,23 +96,22 @@ impl Case {
     /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
         let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e, &EXAMPLES))?;
-        Self::build("in-memory".to_owned(), &file, facets)
+        Self::build("in-memory".to_owned(), &file, facets).map_err(|failure| failure.why)
     }
 
-    fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self, String> {
+    fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self> {
         let mut vertices = facets.as_flattened().iter().enumerate();
         if let Some((i, [x, y, z])) = vertices.find(|(_, v)| !v.iter().all(|c| c.is_finite())) {
             let facet = i / 3;
-            return Err(format!(
+            return Err(Failure::input(format_args!(
                 "facet {facet} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry"
-            ));
+            )));
         }
         let root = root(file, &facets)?;
         positive("spacing_min", file.spacing_min)?;
         let layer_cells_min = file.layer_cells_min.unwrap_or(4);
-        if layer_cells_min == 0 {
-            return Err("layer_cells_min is 0; a layer has at least one cell".to_owned());
-        }
+        let why = "layer_cells_min is 0; a layer has at least one cell";
+        Failure::unless(layer_cells_min > 0, why)?;
         let level = |what: &str, spacing| {
             let deep =
                 || format!("{what} = {spacing} requires a level deeper than 19; increase it");
@@ -124,9 +123,8 @@ impl Case {
             positive("box spacing", b.spacing)?;
             let ordered =
                 |a: usize| b.min[a] < b.max[a] && b.min[a].is_finite() && b.max[a].is_finite();
-            if !(0..3).all(ordered) {
-                return Err(format!("box {i}: min must be below max in every axis, and finite"));
-            }
+            let why = format!("box {i}: min must be below max in every axis, and finite");
+            Failure::unless((0..3).all(ordered), why)?;
             let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
             boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
         }
@@ -145,11 +143,11 @@ impl Case {
         for (i, (&seed, at)) in case.rules.seeds.iter().zip(&case.seeds).enumerate() {
             if let (leaf, Some(facet)) = case.base_leaf_at(seed, &case.facets_lattice) {
                 let leaf = root.place(leaf);
-                return Err(format!(
+                return Err(Failure::input(format_args!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
                      from the surface",
                     point(*at)
-                ));
+                )));
             }
         }
         Ok(case)
@@ -163,14 +161,13 @@ impl Case {
 
 /// The root cube, given or computed from the body. The order of floating-point operations is part of the
 /// definition.
-fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
+fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root> {
     if let Some(root) = file.root {
-        if file.root_scale.is_some() {
-            return Err("root_scale and [root] exclude each other; give one of them".to_owned());
-        }
+        let why = "root_scale and [root] exclude each other; give one of them";
+        Failure::unless(file.root_scale.is_none(), why)?;
         positive("root edge", root.edge)?;
-        let finite = root.origin.iter().all(|c| c.is_finite());
-        return if finite { Ok(root) } else { Err("the root's origin is not finite".to_owned()) };
+        let is_finite = root.origin.iter().all(|c| c.is_finite());
+        return Failure::unless(is_finite, "the root's origin is not finite").map(|()| root);
     }
     let scale = file.root_scale.unwrap_or(10.0);
     positive("root_scale", scale)?;
@@ -178,9 +175,8 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     let low = [0, 1, 2].map(|a| along(a).fold(f64::INFINITY, f64::min));
     let high = [0, 1, 2].map(|a| along(a).fold(f64::NEG_INFINITY, f64::max));
     let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::NEG_INFINITY, f64::max);
-    if longest <= 0.0 {
-        return Err("the body has no extent from which to compute a root; give a [root]".to_owned());
-    }
+    let why = "the body has no extent from which to compute a root; give a [root]";
+    Failure::unless(longest > 0.0, why)?;
     let edge = scale * longest;
     let origin = std::array::from_fn(|a| (low[a] + high[a]) * 0.5 - edge * 0.5);
     Ok(Root { origin, edge })
@@ -210,9 +206,9 @@ fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, St
     seeds.iter().enumerate().map(on_lattice).collect()
 }
 
-fn positive(what: &str, value: f64) -> Result<(), String> {
-    let why = || format!("{what} = {value} must be finite and greater than zero");
-    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(why()) }
+fn positive(what: &str, value: f64) -> Result<()> {
+    let why = format!("{what} = {value} must be finite and greater than zero");
+    Failure::unless(value.is_finite() && value > 0.0, why)
 }
 
 /// Examples of keys of a case file.

@@ -73,18 +73,18 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 /// Reads the study, restricted to the names of `--only`.
-fn read(arguments: &Arguments) -> Result<Study, String> {
+fn read(arguments: &Arguments) -> Result<Study> {
     let default = || Paths::find().root.join("reports/small.toml");
     let file = arguments.file.clone().unwrap_or_else(default);
     let mut study = Study::read(&file)?;
-    study.only(&arguments.only).map_err(|why| format!("{}: {why}", file.display()))?;
+    study.only(&arguments.only).map_err(|why| Failure::about(&file, why))?;
     if arguments.engine.is_empty() {
         return Ok(study);
     }
-    if study.series.is_empty() || !study.row.is_empty() {
-        let why = "--engine is for series, and rows are judged of our mesher: name experiments with --only";
-        return Err(format!("{}: {why}", file.display()));
-    }
+    let why =
+        "--engine is for series, and rows are judged of our mesher: name experiments with --only";
+    let has_series_alone = !study.series.is_empty() && study.row.is_empty();
+    Failure::unless(has_series_alone, Failure::about(&file, why))?;
     for series in &mut study.series {
         series.engines = distinct(arguments.engine.clone());
     }

@@ -64,10 +64,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    if out.exists() && !arguments.test_only {
-        let why = "is there already: remove it, or give another directory with --out";
-        return Err(Failure::about(&out, why));
-    }
+    let why = "is there already: remove it, or give another directory with --out";
+    Failure::unless(arguments.test_only || !out.exists(), Failure::about(&out, why))?;
     let named = |error| Failure::at(&out, error);
     let staging = || Staging::inside(nearest_directory(&out)).map_err(named);
     let staging = (!arguments.test_only).then(staging).transpose()?;

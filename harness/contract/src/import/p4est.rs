@@ -31,16 +31,12 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     Failure::unless(forest.connectivity.dimension == 3, why)?;
     Failure::unless(!forest.leaves.is_empty(), damaged("it is a connectivity without leaves"))?;
     let trees = placed_trees(&forest.connectivity)?;
-    let with_sides = match (request.sides.as_deref(), forest.data_bytes) {
-        (None, _) => false,
-        (Some(SIDES), 1) => true,
-        (Some(name), data_bytes) => {
-            return Err(Failure::input(format!(
-                "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides \
-                 {SIDES} if the quadrants have one byte of data, their side"
-            )));
-        }
-    };
+    let (name, data_bytes) = (request.sides.as_deref().unwrap_or(SIDES), forest.data_bytes);
+    let why = format!(
+        "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides \
+         {SIDES} if the quadrants have one byte of data, their side"
+    );
+    Failure::unless(request.sides.is_none() || name == SIDES && data_bytes == 1, why)?;
     let stated = match (trees.corners.as_slice(), trees.edges.as_slice()) {
         (&[origin], &[edge]) => Root { origin, edge },
         _ => trees.least_root()?,
@@ -55,7 +51,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     );
     Failure::unless(!request.is_root_of_case || stated == Root::UNIT || is_there, why)?;
     let (scale, length) = (placed.edge / stated.edge, forest.length());
-    let sides = with_sides.then(Vec::new);
+    let sides = request.sides.as_ref().map(|_| Vec::new());
     let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
         let offset = |a: usize| (trees.corners[tree][a] - stated.origin[a]) * scale;

@@ -18,11 +18,9 @@ pub const SIDES: &str = "side";
 /// # Errors
 /// If a part cannot be read, or a word is not a leaf.
 pub fn read(path: &Path, request: &Request) -> Result<Cells> {
-    if let Some(name) = request.sides.as_deref().filter(|name| *name != SIDES) {
-        return Err(Failure::input(format!(
-            "leaf words have no array {name}: request their sides with --sides {SIDES}"
-        )));
-    }
+    let name = request.sides.as_deref().unwrap_or(SIDES);
+    let why = format!("leaf words have no array {name}: request their sides with --sides {SIDES}");
+    Failure::unless(name == SIDES, why)?;
     refuse_leaf_set(path)?;
     let parts = match path.is_dir() {
         true => read_parts(path)?,
@@ -32,15 +30,13 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
     let mut cells =
         Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
     for (part, words) in parts {
+        let part = if part.is_empty() { part } else { part + ": " };
         for word in words {
+            let cell = cells.count();
             // Side bits must be valid only if they are used.
-            if let Err(why) = word::check(if with_sides { word } else { word & !3 }) {
-                let cell = cells.count();
-                let part = if part.is_empty() { part } else { part + ": " };
-                return Err(Failure::input(format!(
-                    "{part}cell {cell} is the word {word:#018x}, in which {why}"
-                )));
-            }
+            word::check(if with_sides { word } else { word & !3 }).map_err(|why| {
+                format!("{part}cell {cell} is the word {word:#018x}, in which {why}")
+            })?;
             let octant = word::octant(word);
             cells.push(root.to_user(octant.bounds().0), root.edge_of(octant.level));
             cells.sides.iter_mut().for_each(|sides| sides.push(Side::ALL[(word & 3) as usize]));
