@@ -247,6 +247,7 @@ fn one_corrupt_leaf_of_more_than_2_to_the_37_is_found() {
         }
         let mut manifest = Manifest { keep_crossing: true, ..leaf_set(vec![]).manifest };
         manifest.parts.clear();
+        manifest.level_surface = 16;
         manifest.count(16 << 2, 1 << 48);
         assert!(manifest.leaves > 1 << 37 && tally.leaves >= (1 << 48) - 511);
         let pass = Pass { tally, linear: CheckResult::new("linear"), tree: Some(builder.finish()) };

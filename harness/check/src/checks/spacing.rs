@@ -73,15 +73,20 @@ fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     });
 }
 
-/// No leaf is finer than the surface and the boxes require anywhere.
+/// No leaf is finer than the surface and the boxes require anywhere. Only the first is a finding, as all of a mesh may be.
 fn none_finer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let level = terms.level_deepest();
-    let is_finer = |octant: &Octant, handle| tree.finest_level(handle, octant.level) > level;
-    tree.walk_where(is_finer, &mut |octant, _| {
-        let leaf = terms.root.place(octant);
-        result.report(format_args!(
-            "the leaf {leaf} is finer than level {level}, the deepest of surface and boxes"
-        ));
+    let mut is_found = false;
+    tree.walk(&mut |octant, handle| {
+        let is_finer = !is_found && tree.finest_level(handle, octant.level) > level;
+        if is_finer && !handle.is_node() {
+            is_found = true;
+            let leaf = terms.root.place(octant);
+            result.report(format_args!(
+                "the leaf {leaf} is finer than level {level}, the deepest of surface and boxes"
+            ));
+        }
+        is_finer
     });
 }
 
