@@ -142,7 +142,7 @@ def rows(columns, request):
         level = column("level")
         root = request["root"]
         if root is None:
-            raise Refused("has levels, which give no edges without a root: give it with --root X,Y,Z,EDGE or --case CASE")
+            raise Refused("has a column level, which needs a root: give it with --root X,Y,Z,EDGE or --case CASE")
         wrong = np.flatnonzero(~((level >= 0) & (level <= LEVEL_MAX) & (level % 1 == 0)))
         if len(wrong):
             raise Refused(f"cell {wrong[0]} has the level {level[wrong[0]]}, and levels are whole numbers from 0 to {LEVEL_MAX}")
@@ -238,7 +238,7 @@ def of_ubc(text, requested):
         raise Refused(f"has {shape} smallest cells along the axes")
     rows = numbers(" ".join(lines[4:]))
     if any(len(line.split()) != 4 for line in lines[4:]) or len(rows) != 4 * counted[0]:
-        raise Refused(f"states {counted[0]:.0f} cells and has {len(lines) - 4} lines, of four numbers each: it is incomplete")
+        raise Refused(f"states {counted[0]:.0f} cells and has {len(lines) - 4} lines, of four numbers each: these must agree")
     i, j, k, sizes = rows.reshape(-1, 4).T
     edge = edges[0]
     root = grid([int(n) for n in shape], [*origin[:2], origin[2] - shape[2] * edge], edges.tolist())

@@ -191,7 +191,8 @@ class CellsTest(unittest.TestCase):
         }
         for text, sentence in sentences.items():
             self.assertIn(sentence, self.refused(self.table(text), root=root))
-        self.assertIn("--root", self.refused(self.table("0 0 0 1")))
+        for table in ("0 0 0 1", "x,y,z,level,edge\n0,0,0,1,1"):
+            self.assertIn("has a column level, which needs a root", self.refused(self.table(table)))
         self.assertIn("need a column level", self.refused(self.table("x,y,z,edge\n0,0,0,1"), position="index"))
         self.assertIn("has no column body", self.refused(self.table("0 0 0 1"), root=root, sides="body"))
 

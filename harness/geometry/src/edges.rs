@@ -6,7 +6,7 @@
 use contract::case::Facet;
 use contract::lattice::{self, normal, sorted};
 use serde::Serialize;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -111,14 +111,21 @@ fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
 }
 
 /// Edges with an odd number of facets, more than one, and pairs of neighbours with inconsistent winding.
-pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
+pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
     let mut findings = [Kind::NonManifoldOdd, Kind::Winding].map(Finding::new);
+    let alone = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0].facet);
+    let mut edges_alone: HashMap<u32, u32> = HashMap::new();
+    alone.for_each(|facet| *edges_alone.entry(facet).or_default() += 1);
+    // It has a single edge in common with others, and no area that a ray could meet.
+    let is_sliver = |facet: u32| !has_area(input, facet) && edges_alone.get(&facet) == Some(&2);
     for uses in edges.iter() {
         let at = match uses {
             [a, b] if a.is_down == b.is_down => 1,
             [_, _, _, ..] if uses.len() % 2 == 1 => 0,
             _ => continue,
         };
+        let met = uses.iter().filter(|one| !is_sliver(one.facet)).count();
+        findings[at].count_changing += u64::from(at == 0 && met % 2 == 1);
         findings[at].add(first, || {
             let [p, q] = uses[0].ends.map(|v| edges.points[v as usize]);
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
@@ -128,42 +135,49 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
     findings
 }
 
-/// Facets without area with a vertex that no facet with area has, or with an edge whose middle is on none, as where a strip of triangles
-/// continues elsewhere. A facet at those of others, as of a T-junction, changes nothing.
-pub fn stray(input: &Input, edges: &Edges, tree: &FacetTree, first: usize) -> Finding {
+fn has_area(input: &Input, facet: u32) -> bool {
+    normal(&input.case.facets_lattice[facet as usize]) != [0; 3]
+}
+
+/// Facets without area with a corner, or the middle of an edge, on no facet with area, as where a strip of triangles continues elsewhere. One
+/// on the others, as of a T-junction, changes nothing.
+pub fn stray(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Stray);
-    let has_area = |facet: &u32| normal(&input.case.facets_lattice[*facet as usize]) != [0; 3];
     let is_off = |[p, q]: [[i64; 3]; 2]| {
         let middle = Point::from_array([0, 1, 2].map(|a| (p[a] + q[a]) as f64 / 2.0));
-        !tree.within(middle, TOUCHING).iter().any(has_area)
+        !tree.within(middle, TOUCHING).iter().any(|&facet| has_area(input, facet))
     };
-    let facets = (0..).zip(&edges.corners);
-    let (others, flat): (Vec<_>, Vec<_>) = facets.partition(|(facet, _)| has_area(facet));
-    let used: HashSet<u32> = others.iter().flat_map(|(_, corners)| **corners).collect();
-    for (facet, corners) in flat {
-        let mut ends = lattice::edges(&input.case.facets_lattice[facet as usize]).into_iter();
-        if !corners.iter().all(|corner| used.contains(corner)) || ends.any(is_off) {
+    for (facet, corners) in (0..).zip(&input.case.facets_lattice) {
+        let ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));
+        if !has_area(input, facet) && ends.into_iter().any(is_off) {
             finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
     }
     finding
 }
 
-/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. A facet with a repeated vertex is degenerate, not a
-/// duplicate.
-pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
+/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one, and two with a solid behind each, by the numbers of
+/// `solids`, are where solids touch. A facet with a repeated vertex is degenerate, not a duplicate.
+pub fn duplicates(
+    input: &Input,
+    edges: &Edges,
+    solids: &BTreeMap<u32, i64>,
+    first: usize,
+) -> Finding {
     let mut finding = Finding::new(Kind::Duplicates);
-    let mut copies: HashMap<_, (u32, u64)> = HashMap::new();
+    let mut copies: HashMap<_, Vec<u32>> = HashMap::new();
     let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
     for (corners, facet) in all.filter(|([a, b, c], _)| a != b && b != c) {
-        let (original, count) = copies.entry(corners).or_insert((facet, 0));
-        *count += 1;
-        if *original != facet {
-            finding.add(first, || Place::new(vec![*original, facet], input.centroid(facet)));
+        let copies = copies.entry(corners).or_default();
+        copies.push(facet);
+        if copies[0] != facet {
+            finding.add(first, || Place::new(vec![copies[0], facet], input.centroid(facet)));
         }
     }
-    let counts = copies.values().map(|(_, count)| count);
-    finding.count_changing = counts.filter(|&count| count % 2 == 0).map(|count| count - 1).sum();
+    let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
+    let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
+    let changing = copies.values().filter(|copies| copies.len() % 2 == 0 && !touch(copies));
+    finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();
     finding
 }
 

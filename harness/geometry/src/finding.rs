@@ -23,7 +23,7 @@ pub enum Kind {
     InsideOut,
     /// Closed shells that lie in an odd number of other closed ones.
     Nested,
-    /// Facets without area with a vertex that no facet with area has, or an edge whose middle is on none.
+    /// Facets without area with a corner, or the middle of an edge, on no facet with area.
     Stray,
     /// Facets with the three vertices of an earlier facet, in any order. The kinds below count copies of the same winding once.
     Duplicates,
@@ -102,11 +102,10 @@ impl Finding {
 }
 
 impl Kind {
-    /// Whether every occurrence can change the mesh's region. Openings, duplicates and intersections are judged one by one.
+    /// Whether every occurrence can change the mesh's region. Openings, odd edges, duplicates and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
-            Self::NonManifoldOdd | Self::Stray | Self::Overlaps => true,
-            Self::Rounded | Self::OutsideRoot => true,
+            Self::Stray | Self::Overlaps | Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -128,9 +127,9 @@ impl Kind {
             Self::Nested => ("closed shells in closed shells",
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
             Self::Stray => ("facets without area, apart",
-                "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. The root grows to hold them. Remove them."),
+                "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. Remove them."),
             Self::Duplicates => ("duplicate facets",
-                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
+                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Keep one of the copies where the body ends, and none within it."),
             Self::Intersections => ("intersecting pairs of facets",
                 "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
             Self::Overlaps => ("facets within another solid",
@@ -197,8 +196,11 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
              depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
+        Kind::NonManifoldOdd if finding.count_changing == 0 => {
+            "No effect: one facet at each is a sliver without area, which no ray meets.".into()
+        }
         Kind::Duplicates if finding.count_changing == 0 => {
-            "No effect: each of these facets appears an odd number of times, which rays pass like one.".into()
+            "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, like none.".into()
         }
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
@@ -319,7 +321,7 @@ mod tests {
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
-        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Overlaps];
+        let always = [Kind::Stray, Kind::Overlaps];
         let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(

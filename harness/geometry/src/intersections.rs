@@ -11,7 +11,7 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::shells::Shells;
 use super::tree::{FacetTree, from_least};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::iter::repeat_n;
 
 /// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or is back to back in
@@ -55,9 +55,19 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
     }
 }
 
-/// Facets with an even number of solids on their inner side, in the middle. The surfaces that bound them may cross only where facets of both have
-/// edges, so that no pair intersects. Only closed shells of consistent winding count.
-pub fn overlaps(input: &Input, tree: &FacetTree, shells: &Shells, first: usize) -> Finding {
+/// Facets with an even number of solids on their inner side. The surfaces that bound them may cross only where facets of both have
+/// edges, so that no pair intersects.
+pub fn overlaps(input: &Input, solids: &BTreeMap<u32, i64>, first: usize) -> Finding {
+    let mut finding = Finding::new(Kind::Overlaps);
+    for (&f, _) in solids.iter().filter(|(_, count)| **count > 0 && **count % 2 == 0) {
+        finding.add(first, || Place::new(vec![f], input.centroid(f)));
+    }
+    finding
+}
+
+/// The number of solids just behind the middle of each facet, on its inner side, but for copies of the same winding. Only closed shells of
+/// consistent winding count.
+pub fn inner_solids(input: &Input, tree: &FacetTree, shells: &Shells) -> BTreeMap<u32, i64> {
     let outward = |f: u32| {
         let [a, b, c] = input.case.facets_lattice[f as usize];
         Some(if shells.outward(f)? { [a, b, c] } else { [a, c, b] })
@@ -68,19 +78,16 @@ pub fn overlaps(input: &Input, tree: &FacetTree, shells: &Shells, first: usize) 
     }
     // Rays count all copies, but an even number of them is like two, and an odd one like one.
     let all: Vec<_> = copies.into_iter().flat_map(|(f, n)| repeat_n(f, 2 - n % 2)).collect();
-    let (parity, mut finding) = (Parity::new(&all), Finding::new(Kind::Overlaps));
-    let solids = tree.firsts.iter().filter_map(|&f| Some((f, outward(f)?)));
-    for (f, facet) in solids.filter(|(_, facet)| normal(facet) != [0; 3]) {
+    let parity = Parity::new(&all);
+    let outward = tree.firsts.iter().filter_map(|&f| Some((f, outward(f)?)));
+    let solids = outward.filter(|(_, facet)| normal(facet) != [0; 3]).map(|(f, facet)| {
         let n = normal(&facet).map(|c| c as f64);
         let step = 3.0 * ROUNDING / n.iter().map(|c| c * c).sum::<f64>().sqrt();
         let behind =
             |a: usize| (facet[0][a] + facet[1][a] + facet[2][a]) / 3 - (step * n[a]).round() as i64;
-        let solids = parity.winding(std::array::from_fn(behind));
-        if solids > 0 && solids % 2 == 0 {
-            finding.add(first, || Place::new(vec![f], input.centroid(f)));
-        }
-    }
-    finding
+        (f, parity.winding(std::array::from_fn(behind)))
+    });
+    solids.collect()
 }
 
 /// Whether the interiors of two triangles with area, as sets of their planes, have a common point.

@@ -30,13 +30,14 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let edges = Edges::new(&input.case.facets);
     let shells = Shells::new(&edges, &input.case.facets_lattice);
     let mut findings = vec![openings::openings(input, &edges, first)];
-    findings.extend(edges::findings(&edges, first));
+    findings.extend(edges::findings(input, &edges, first));
     findings.extend(shells.findings(input, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
-    findings.push(edges::stray(input, &edges, &tree, first));
-    findings.push(edges::duplicates(input, &edges, first));
+    findings.push(edges::stray(input, &tree, first));
+    let solids = intersections::inner_solids(input, &tree, &shells);
+    findings.push(edges::duplicates(input, &edges, &solids, first));
     findings.push(intersections::intersections(input, &tree, &shells, first));
-    findings.push(intersections::overlaps(input, &tree, &shells, first));
+    findings.push(intersections::overlaps(input, &solids, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, &shells, cell));
         findings.push(finding::rounded(input, first));

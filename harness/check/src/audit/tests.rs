@@ -49,9 +49,13 @@ proptest! {
 
 #[test]
 fn a_correct_mesh_passes_and_an_unsorted_part_fails() {
-    let words = correct();
-    assert!(audited(&leaf_set(vec![words.clone(), vec![]])).holds());
-    let mut unsorted = words;
+    let mut unsorted = correct();
+    let mut set = leaf_set(vec![unsorted.clone(), vec![]]);
+    set.manifest.level_surface = 3;
+    assert!(audited(&set).holds());
+    // The deepest leaves, of level 3, need a surface or a box.
+    set.manifest.level_surface = 2;
+    assert_eq!(found(&audited(&set)), ["spacing"]);
     unsorted.swap(3, 4);
     let report = audited(&leaf_set(vec![unsorted]));
     assert!(found(&report).contains(&"linear"));
@@ -243,6 +247,7 @@ fn one_corrupt_leaf_of_more_than_2_to_the_37_is_found() {
         }
         let mut manifest = Manifest { keep_crossing: true, ..leaf_set(vec![]).manifest };
         manifest.parts.clear();
+        manifest.level_surface = 16;
         manifest.count(16 << 2, 1 << 48);
         assert!(manifest.leaves > 1 << 37 && tally.leaves >= (1 << 48) - 511);
         let pass = Pass { tally, linear: CheckResult::new("linear"), tree: Some(builder.finish()) };
@@ -321,6 +326,7 @@ fn a_tree_beside_parts_must_have_their_leaves() {
 #[test]
 fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
     let mut set = leaf_set(vec![correct()]);
+    set.manifest.level_surface = 3;
     for extra_leaves in [0, 1] {
         set.manifest.leaves += extra_leaves;
         let report = audited(&set);

@@ -1,7 +1,8 @@
 //! Leaves are as fine as the surface and the boxes require.
 //!
 //! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface,
-//! and every leaf whose interior meets the interior of a box has at least the level of the box. The check
+//! and every leaf whose interior meets the interior of a box has at least the level of the box. No rule asks for a leaf that is finer than the
+//! deepest of these levels. The check
 //! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `splits`
 //! detects needless refinement, also of a T0.
 //!
@@ -38,6 +39,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     }
     boxes_met(tree, terms, result);
     crossing_fine(tree, terms, result);
+    none_finer(tree, terms, result);
     let kinds = tree.kinds(tree.root());
     let without = kinds & 1 << Side::Crossing as u8 == 0 && terms.boxes.is_empty();
     let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
@@ -68,6 +70,23 @@ fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     tree.walk_where(is_coarse, &mut |octant, _| {
         let leaf = terms.root.place(octant);
         result.report(format_args!("the crossing leaf {leaf} is coarser than level {level}"));
+    });
+}
+
+/// No leaf is finer than the surface and the boxes require anywhere. Only the first is a finding, as all of a mesh may be.
+fn none_finer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
+    let level = terms.level_deepest();
+    let mut is_found = false;
+    tree.walk(&mut |octant, handle| {
+        let is_finer = !is_found && tree.finest_level(handle, octant.level) > level;
+        if is_finer && !handle.is_node() {
+            is_found = true;
+            let leaf = terms.root.place(octant);
+            result.report(format_args!(
+                "the leaf {leaf} is finer than level {level}, the deepest of surface and boxes"
+            ));
+        }
+        is_finer
     });
 }
 

@@ -114,8 +114,8 @@ pub(super) const MUTANTS: &[Mutant] = &[
     base("T0 needlessly fine away from the surface", "identical", INFORMED, |s| {
         split_first(&s.base.words, |w| !word::is_crossing(w) && is_not_finest(w))
     }),
-    base("T0 needlessly fine at the surface", "identical", INFORMED, |s| {
-        // On the deepest level, no box requires the split.
+    base("T0 needlessly fine at the surface", "spacing", AUDITED, |s| {
+        // On the deepest level, neither surface nor boxes require the split.
         let is_deepest = |w| is_not_finest(w) && word::level(w) == s.case.level_deepest();
         split_first(&s.base.words, |w| word::is_crossing(w) && is_deepest(w))
     }),

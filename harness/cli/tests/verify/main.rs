@@ -378,16 +378,17 @@ fn the_comparison_with_p4est_is_made_with_what_the_engine_takes_and_writes() {
 }
 
 #[test]
-fn a_run_report_that_contradicts_the_mesh_is_detected() {
+fn a_run_report_that_contradicts_the_mesh_or_the_case_is_detected() {
     let fixture = Fixture::new();
-    fixture.script("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
-    let outcome = fixture.verify(&["--no-mpi"]);
-    assert_eq!(
-        (outcome.code, outcome.printed.contains("states 2 cells, and its mesh has 1")),
-        (1, true),
-        "{}",
-        outcome.printed
-    );
+    for (stated, why) in [
+        ("\"cells\": 2", "states 2 cells, and its mesh has 1"),
+        ("\"cells\": 1, \"facets\": 3", "reports 3 facets, and the case has "),
+    ] {
+        fixture.script("mesher", &HOLDS.replace("\"cells\": 1", stated));
+        let outcome = fixture.verify(&["--no-mpi"]);
+        let is_found = outcome.printed.contains(why);
+        assert_eq!((outcome.code, is_found), (1, true), "{}", outcome.printed);
+    }
 }
 
 #[test]

@@ -89,8 +89,8 @@ pub fn guess(path: &Path) -> Result<Format> {
         poly_mesh(path).map(|_| Format::Openfoam)
     } else if path.ends_with(manifest::FILE) {
         return Err(Failure::input("is the manifest of a leaf set: give its directory"));
-    } else if path.extension().is_some_and(|extension| extension == "toml") {
-        return Err(Failure::input("is a case file by its name: give a mesh"));
+    } else if let Some("toml" | "stl" | "STL") = path.extension().and_then(|e| e.to_str()) {
+        return Err(Failure::input("is a case file or a geometry by its name: give a mesh"));
     } else {
         let mut head = Vec::new();
         let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
@@ -170,7 +170,11 @@ mod tests {
     #[test]
     fn a_manifest_and_a_case_file_are_no_meshes() {
         let place = tempfile::tempdir().unwrap();
-        for (name, why) in [("a.toml", "case file"), (manifest::FILE, "give its directory")] {
+        for (name, why) in [
+            ("a.toml", "case file"),
+            ("a.stl", "geometry by its name"),
+            (manifest::FILE, "give its directory"),
+        ] {
             let path = place.path().join(name);
             fs::write(&path, "{}").unwrap();
             assert!(guess(&path).unwrap_err().to_string().contains(why), "{name}");

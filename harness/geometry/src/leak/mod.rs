@@ -111,6 +111,9 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             let space = Space::new(words, &self.facets, outside)?;
             let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
             passage.check_invariants(self.case, (words, outside), (from, to));
+            // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
+            let cell = passage.narrowest.cell_of_boxes;
+            report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
             report.passage = Some(passage);
         }
         Ok(report)

@@ -19,6 +19,7 @@ use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::{Result, Watch};
 use contract::lattice::UNITS_PER_EDGE;
+use contract::manifest::ExtentBox;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
 use std::collections::BTreeSet;
@@ -127,7 +128,8 @@ pub fn widest(
     Ok(described((case, facets), level, &way, (&before, &after)))
 }
 
-/// The way from a point of a free leaf, in steps along the axes through free leaves, to where no step leads farther from the facets.
+/// The way from a point of a free leaf, in legs along the axes through free leaves, to where no step leads farther from the facets. A step is
+/// a leg or, where two or three walls are equally near and no single leg leads away from all, a leg along each of two or three axes.
 fn approach(space: &Space, from: Point) -> Vec<Point> {
     let mut points = vec![from];
     let mut clearance = space.facets.distance(from);
@@ -135,15 +137,20 @@ fn approach(space: &Space, from: Point) -> Vec<Point> {
     let is_free = |at: Point| {
         root().contains_local_point(at) && space.cells[space.locate(at) as usize].is_open
     };
+    let signs = |i: u32| Point::from_array([i % 3, i / 3 % 3, i / 9].map(|c| f64::from(c) - 1.0));
+    let directions: Vec<Point> = (0..27).filter_map(|i| signs(i).try_normalize()).collect();
     while step > SMALL * clearance {
         let at = points[points.len() - 1];
-        let axes = [Point::X, Point::Y, Point::Z].into_iter();
-        let ends = axes.flat_map(|axis| [at - axis * step, at + axis * step]);
-        let open = ends.filter(|&to| is_free(to) && is_free(at.midpoint(to)));
-        let farther = open.map(|to| (space.facets.distance(to), to)).filter(|to| to.0 > clearance);
+        let way = |d: Point| [at, at + d * Point::X, at + d.with_z(0.0), at + d];
+        let is_open = |leg: &[Point]| is_free(leg[1]) && is_free(leg[0].midpoint(leg[1]));
+        let ways = directions.iter().map(|&d| way(d * step));
+        let open = ways.filter(|way| way.windows(2).all(is_open));
+        let reached = open.map(|way| (space.facets.distance(way[3]), way));
+        let farther = reached.filter(|to| to.0 > clearance);
         match farther.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((distance, to)) => {
-                points.push(to);
+            Some((distance, way)) => {
+                points.extend(&way[1..]);
+                points.dedup();
                 (clearance, step) = (distance, distance / 2.0);
             }
             None => step /= 2.0,
@@ -263,6 +270,10 @@ fn described(
     let points =
         before[..first].iter().copied().chain(inside).chain(after.iter().rev().skip(1).copied());
     let width = 2.0 * unit * clearance;
+    let is_met = |b: &&ExtentBox| {
+        (0..3).all(|a| (b.min[a] as f64) < at[a] + clearance && at[a] - clearance < b.max[a] as f64)
+    };
+    let boxes = case.boxes.iter().filter(is_met).map(|b| case.root.edge_of(b.level));
     Passage {
         spacing: Spacing::of(level, &case.root),
         narrowest: Narrowest {
@@ -271,6 +282,7 @@ fn described(
             width_min: 2.0 * unit * way.passing(),
             width_max: 2.0 * unit * way.bound,
             width_cells: width / case.root.edge_of(case.level_surface),
+            cell_of_boxes: boxes.fold(f64::INFINITY, f64::min),
             facets: facets.within(at, RIM * clearance),
             index: first + narrowest,
             is_end: [0, last].iter().any(|&end| way.points[end].clearance <= PRECISION * clearance),

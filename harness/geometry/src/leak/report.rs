@@ -59,6 +59,9 @@ pub struct Narrowest {
     pub width_max: f64,
     /// `width` in cells of the case's surface level.
     pub width_cells: f64,
+    /// The edge of the finest cells of boxes that this ball meets; infinite if it meets none.
+    #[serde(skip)]
+    pub cell_of_boxes: f64,
     /// The facets at the rim, which the ball touches to within 5 % of its radius, by number from 0; nearest first.
     pub facets: Vec<u32>,
     /// Index among the points of the path.
@@ -119,8 +122,7 @@ pub struct Answers {
 /// Facets at the rim that are printed.
 const FACETS_MAX: usize = 24;
 /// What follows a spacing that closes an opening.
-const CLOSE: &str =
-    "close it wherever the lattice lies; a finer one may close it on this lattice only.";
+const CLOSE: &str = "close this opening wherever the lattice lies, and finer ones may on this lattice; others have widths of their own (`harness geometry`).";
 const END: &str = "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends.\n";
 /// What follows where no path explains that the start is outside.
 const ENCLOSED: &str = ": the facets enclose the start, although by its rays it is outside, as beside openings, overlaps and facets that appear \
@@ -174,11 +176,12 @@ impl fmt::Display for Report {
     }
 }
 
-/// What is printed of a widest path. Where no spacing closes it, as in a finer box, none is named.
+/// What is printed of a widest path. Where no spacing closes it, as in a box of cells that pass through it, none is named.
 fn describe(passage: &Passage, is_closed: bool, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let n = &passage.narrowest;
     let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
-    let (is_named, end) = (is_closed && !n.is_end, if n.is_end { END } else { "" });
+    let is_named = is_closed && !n.is_end && n.width_max <= n.cell_of_boxes;
+    let end = if n.is_end { END } else { "" };
     let closing = format!("          Spacings above {max} {CLOSE}\n");
     let closing = if is_named { &closing } else { "" };
     let listed: Vec<String> = n.facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
@@ -212,6 +215,7 @@ mod tests {
             width_min: 0.124,
             width_max: 0.128,
             width_cells: 0.25,
+            cell_of_boxes: f64::INFINITY,
             facets: facets.collect(),
             index,
             is_end,
@@ -243,7 +247,7 @@ mod tests {
         let expected = "LEAK: free leaves join start and end; closed at spacing 2 (level 2), where facets cross the leaf of the start or the end\n\
             \nThe narrowest place of the widest path\n\
             width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
-            Spacings above 0.128 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
+            Spacings above 0.128 close this opening wherever the lattice lies, and finer ones may on this lattice; others have widths of their own (`harness geometry`).\n\
             at        (0.5, 0, -1.25)\nfacets    3, 4\n";
         assert_eq!(leak(3, narrowest(3..5, 1, false)).to_string(), format!("{HEAD}{expected}"));
     }
@@ -274,6 +278,9 @@ mod tests {
         let report = Report { closes: None, ..leak(3, narrowest(3..5, 1, false)) };
         let text = report.to_string();
         assert!(text.contains(", at every spacing") && !text.contains("Spacings above"), "{text}");
+        // The cells of a box pass through the opening, although coarser ones close the path elsewhere.
+        let narrowest = Narrowest { cell_of_boxes: 0.1, ..narrowest(3..5, 1, false) };
+        assert!(!leak(3, narrowest).to_string().contains("Spacings above"));
     }
 
     #[test]

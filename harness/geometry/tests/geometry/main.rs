@@ -152,6 +152,19 @@ fn a_repeated_facet_is_a_duplicate_in_any_order_of_its_vertices() {
     assert!(found.changes_region);
 }
 
+/// As in assemblies: the copies are within the body, unless one of the solids is there twice, once inside out.
+#[test]
+fn solids_that_touch_in_equal_facets_do_not_change_the_region() {
+    let touching = [cube(), cuboid([4.0, 0.0, 0.0], [8.0, 4.0, 4.0])].concat();
+    let found = diagnosis(touching.clone(), Some(0.25));
+    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Duplicates, 2)], false));
+    assert!(found.to_string().contains("where solids touch"));
+    let mut inward = cube();
+    inward.iter_mut().for_each(|facet| facet.swap(0, 1));
+    let beside = cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0]);
+    assert!(diagnosis([cube(), inward, beside].concat(), Some(0.25)).changes_region);
+}
+
 #[test]
 fn a_flipped_facet_disagrees_with_three_neighbours() {
     let mut facets = cube();
@@ -362,6 +375,14 @@ fn facets_without_area_have_no_effect_unless_they_are_apart() {
         let found = diagnosis([cube(), vec![[from, to, to]]].concat(), Some(0.25));
         assert_eq!((count(&found, Kind::Stray), found.changes_region), (stray, stray > 0));
     }
+    // A sliver on an edge of the cube lies on its facets, too, and no ray meets it; but a fin at its middle has an odd number of them.
+    let (from, middle, to) = ([0.0, 0.0, 4.0], [2.0, 0.0, 4.0], [4.0, 0.0, 4.0]);
+    let mut facets = [cube(), vec![[from, middle, to]]].concat();
+    let found = diagnosis(facets.clone(), Some(0.25));
+    assert_eq!((count(&found, Kind::Stray), count(&found, Kind::NonManifoldOdd)), (0, 1));
+    assert!(!found.changes_region && found.to_string().contains("a sliver without area"));
+    facets.push([middle, to, [9.0; 3]]);
+    assert_eq!(diagnosis(facets, None).finding(Kind::NonManifoldOdd).unwrap().count_changing, 1);
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
     assert_eq!((counts(&point), point.shells.facets), (vec![(Kind::Stray, 1)], 0));
 }

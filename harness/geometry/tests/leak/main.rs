@@ -218,6 +218,38 @@ fn an_opening_in_a_finer_box_is_measured_and_no_spacing_closes_it() {
     assert_describes(report, &body, "a box");
 }
 
+/// A box of cells that pass through the opening keeps it open at every spacing, also where coarser cells would be crossed at the ends.
+#[test]
+fn no_spacing_closes_an_opening_in_a_finer_box() {
+    let body = hole(0.05);
+    let Root { origin, edge } = ROOT;
+    let text = format!(
+        "spacing_min = 0.25\n[root]\norigin = {origin:?}\nedge = {edge:?}\n\
+         [[box]]\nmin = [-0.07, -0.41, 0.8]\nmax = [0.33, -0.01, 1.2]\nspacing = 0.0078125"
+    );
+    let case = Case::from_parts(&text, body.facets.clone()).unwrap();
+    let tree = |level| {
+        let level = |octant: &Octant| {
+            if case.boxes[0].meets(octant) { case.boxes[0].level } else { level }
+        };
+        Ok(base_tree(&case.facets_lattice, level))
+    };
+    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+    let report = leaks.answers(&[([0.0; 3], Target::Far)]).unwrap().examined.remove(0);
+    assert!(report.is_leak && report.closes.is_none(), "{report}");
+    assert_describes(&report, &body, "a box");
+}
+
+/// No leg along an axis leads away from two or three walls that are equally near.
+#[test]
+fn a_start_as_near_to_several_walls_is_not_an_opening() {
+    let body = hole(0.15);
+    for start in [[0.9, 0.3, 0.9], [-0.9, 0.9, -0.9], [0.9, -0.9, -0.2]] {
+        let report = ask(&case(&body.facets, 7), start, Target::Far).unwrap();
+        assert_describes(&report, &body, &format!("from {start:?}"));
+    }
+}
+
 #[test]
 fn a_closed_body_does_not_leak() {
     let body = missing_facet(77);

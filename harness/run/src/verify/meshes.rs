@@ -81,6 +81,12 @@ impl CaseRun<'_> {
         };
         let Completed { report, finished, .. } =
             self.program(program).run(case, layout, &options)?;
+        // The first is 0 if the program does not report it, the second if the harness refuses the case.
+        let [read, facets] = [report.facets, self.report.facets];
+        if read > 0 && facets > 0 && read != facets {
+            let why = format!("reports {read} facets, and the case has {facets}");
+            return Err(self.program(program).unusable(why));
+        }
         let run = Run {
             program: program.to_owned(),
             layout: layout.rank_count().map(|_| layout.clone()),
