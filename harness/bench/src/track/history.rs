@@ -69,7 +69,7 @@ impl Record {
     ///
     /// # Errors
     /// One sentence, if git does not find the commit.
-    pub fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
+    fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
         let format = "--format=%H%n%cI%n%s";
         let text = git(repository, &["log", "-1", format, "--end-of-options", named]);
         let place = repository.display();
@@ -79,20 +79,6 @@ impl Record {
         let (commit, time, subject) = (next(), next(), next());
         let time = time.parse().map_err(|why| format!("the time of {named}: {why}"))?;
         Ok(Self { time: Some(time), subject, ..Self::new(commit) })
-    }
-
-    /// Returns a record for values of the user: of the commit `named`, else of HEAD.
-    ///
-    /// # Errors
-    /// One sentence, if git does not find it, or no commit is named and a file of git other than the history has changes.
-    pub fn of_values(named: Option<&str>, history: &Path, repo: &Path) -> Result<Self, String> {
-        let name = history.file_name().unwrap_or_default().to_string_lossy();
-        let is_other = |line: &str| !line.ends_with(&*name);
-        let status = ["status", "--porcelain", "--untracked-files=no"];
-        if named.is_none() && git(repo, &status).is_some_and(|of| of.lines().any(is_other)) {
-            return Err("the working tree has changes, and is no commit: give --commit".to_owned());
-        }
-        Self::of_commit(named.unwrap_or("HEAD"), repo)
     }
 
     /// Checks that the metrics can be analysed.

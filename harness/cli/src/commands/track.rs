@@ -2,39 +2,32 @@
 
 use crate::options::{Input, Output, number_in};
 use crate::output::put_forms;
-use bench::experiments::machine;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
 use bench::track::{LEVEL_MIN, Series, VALUES_MIN, analyse};
-use clap::{ArgGroup, Args};
+use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use report::pretty;
 use report::track::{COMMIT, junit, page, summary};
-use run::engine::paths::Paths;
 use std::path::{Path, PathBuf};
 
 /// `harness track`.
 #[derive(Args, Debug)]
-#[command(group = ArgGroup::new("appended").multiple(true))]
 pub struct Arguments {
     /// The history: JSON lines, one record per commit
     history: PathBuf,
     /// Append the numbers of this record or JSON report of `harness gate`; may be repeated
-    #[arg(long, value_name = "FILE", group = "appended")]
+    #[arg(long, value_name = "FILE")]
     add: Vec<Input>,
-    /// Also append this value; may be repeated
-    #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number, group = "appended")]
-    value: Vec<(String, f64)>,
-    /// The commit of the appended values [default: that of the file, or HEAD; none for a working tree with changes to files of git, but for
-    /// the history]
-    #[arg(long, value_name = "REVISION", requires = "appended")]
+    /// The commit of the appended numbers [default: that of the file, or HEAD; none for a working tree with changes]
+    #[arg(long, value_name = "REVISION", requires = "add")]
     commit: Option<String>,
     /// Accept the change of every metric at this commit of the history, or the nearest within two values and ten commits, so that it no
     /// longer fails; may be repeated
     #[arg(long, value_name = "COMMIT")]
     accept: Vec<String>,
     /// The repository that the commit is in [default: that of the current directory]
-    #[arg(long, value_name = "DIR", requires = "appended")]
+    #[arg(long, value_name = "DIR", requires = "add")]
     repository: Option<PathBuf>,
     /// Write the trend page
     #[arg(long, value_name = "FILE")]
@@ -57,15 +50,6 @@ pub struct Arguments {
     alpha: f64,
 }
 
-fn named_number(text: &str) -> Result<(String, f64), String> {
-    let parsed = text.split_once('=').and_then(|(name, number)| {
-        let (case, metric) = name.rsplit_once('/')?;
-        let number = number.parse().ok().filter(|number: &f64| number.is_finite())?;
-        (!case.is_empty() && !metric.is_empty()).then(|| (name.to_owned(), number))
-    });
-    parsed.ok_or_else(|| "give CASE/METRIC=NUMBER".to_owned())
-}
-
 /// Parses a number of last values.
 fn recent(text: &str) -> Result<usize, String> {
     let number = text.parse().ok().filter(|number| *number >= LEVEL_MIN);
@@ -81,12 +65,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let (shown, link) = (arguments.history.display(), arguments.link.as_deref());
     let why = "--link has no {commit}, the place of a commit's hash";
     Failure::unless(link.is_none_or(|link| link.contains(COMMIT)), why)?;
-    if !arguments.add.is_empty() || !arguments.value.is_empty() {
-        append(arguments)?;
-    } else {
-        let why = "is missing: give a history, or the first values with --add or --value";
-        Failure::unless(arguments.history.exists(), format!("{shown} {why}"))?;
-    }
+    let why = format!("{shown} is missing: give a history, or the first numbers with --add");
+    Failure::unless(!arguments.add.is_empty() || arguments.history.exists(), why)?;
+    append(arguments)?;
     arguments.accept.iter().try_for_each(|commit| history::accept(&arguments.history, commit))?;
     let History { records, warnings } = history::read(&arguments.history)?;
     warnings.iter().for_each(|warning| eprintln!("harness: {shown}: {warning}"));
@@ -144,16 +125,7 @@ fn append(arguments: &Arguments) -> Result<()> {
         let why = format!("{} has no metric, so nothing is appended", file.display());
         if record.metrics.is_empty() { Err(Failure::missing(why)) } else { Ok(record) }
     };
-    let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
-    if records.is_empty() {
-        let machine = machine::describe(&Paths::find().mpirun, repository).label();
-        let of_commit = Record::of_values(commit, &arguments.history, repository)?;
-        records.push(Record { machine, ..of_commit });
-    }
-    for (name, value) in &arguments.value {
-        let before = records.last_mut().expect("a record").metrics.insert(name.clone(), *value);
-        Failure::unless(before.is_none(), format!("{name} has two values: give one of them"))?;
-    }
+    let records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>>>()?;
     // It would make the history unreadable.
     records.iter().try_for_each(Record::check).map_err(Failure::input)?;
     for record in &records {

@@ -90,6 +90,12 @@ pub fn inputs(mesher: &Path) -> Place {
         )
     };
     place.write("history.jsonl", [record("a", 1.0), record("b", 2.0)].concat());
+    let of = "{\"named\":\"m\",\"revision\":null,\"program\":\"\"}";
+    let numbers = "{\"case\":{\"digest\":null,\"exact\":{\"x\":3},\"counted\":{}}}";
+    let record = format!(
+        "{{\"schema\":\"octree-measures/1\",\"of\":{of},\"machine\":\"\",\"cases\":{numbers}}}"
+    );
+    place.write("record.json", record);
     let mut command = Command::new(mesher);
     command.args("case.toml --out mesh --write words,htg --comm sim:2:1 --quiet".split(' '));
     let made = place.run(command, LIMIT);
@@ -190,7 +196,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
     let gate = format!(
         "gate --rules gate.toml --layers counters --record r.json --junit g.xml --json g.json --markdown g.md --baseline {mesher} --mesher {mesher}"
     );
-    let track = "track history.jsonl --value case/x=3 --commit HEAD --repository";
+    let track = "track history.jsonl --add record.json --repository";
     let repository = env!("CARGO_MANIFEST_DIR");
     let mut all = vec![
         Program { varying: &["run.json"], ..new("mesher", Mesher, mesh, &["out", "run.json"]) },
