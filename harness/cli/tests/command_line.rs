@@ -142,7 +142,7 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["track", file, "--alpha", "7"], "a number from 0.000001 to 1"),
         (&["track", file, "--alpha", "nan"], "a number from 0.000001 to 1"),
         (&["track", file, "--link", "https://host/{commit}"], "--page <FILE>"),
-        (&["track", file, "--repository", "."], "--add <FILE>|--value"),
+        (&["track", file, "--repository", "."], "--add <FILE>"),
         (&["gate", "--baseline", file], "neither a program that can be executed nor"),
         (&["gate", "--candidate", file], "neither a program that can be executed nor"),
         (&["gate", "--budget", "nan"], "a whole number of seconds"),
