@@ -212,13 +212,18 @@ fn without_outliers(values: &[f64]) -> Vec<f64> {
     // The median of |x - y| of two normal values, in standard deviations.
     let limit = OUTLIER * (median_of(&differences) / (0.6745 * std::f64::consts::SQRT_2));
     if limit == 0.0 {
-        // One other value is no level if the old one returns, another one begins, or nothing follows.
         let mut clean = values.to_vec();
+        // The first level is that of the first value that is repeated.
+        let first = differences.iter().take(LEVEL_MIN).position(|by| *by == 0.0).unwrap_or(0);
+        clean[..first].fill(values[first]);
+        // One other value is no level if the old one returns, another one begins, or too few follow.
         for i in 1..n {
             let (level, follow) = (clean[i - 1], &values[i + 1..n.min(i + LEVEL_MIN)]);
-            let is_once = values[i] != level && follow.first() != Some(&values[i]);
             let is_repeated = follow.len() > 1 && follow[0] == follow[1];
-            if is_once && (follow.is_empty() || follow.contains(&level) || is_repeated) {
+            let is_new = follow.contains(&values[i]) || follow.len() == LEVEL_MIN - 1;
+            let is_too_new = !is_new && i > 1 && clean[i - 2] == level;
+            let is_none = follow.contains(&level) || is_repeated || is_too_new;
+            if is_none && follow.first() != Some(&values[i]) {
                 clean[i] = level;
             }
         }

@@ -153,6 +153,27 @@ fn an_exact_counter_needs_few_values_after_the_change() {
     assert_eq!(places(&values), [30]);
 }
 
+#[test]
+fn other_values_at_the_ends_of_an_exact_counter_are_no_levels_and_hide_none() {
+    for first in [&[500.0][..], &[900.0], &[1200.0], &[900.0, 950.0, 1000.0, 990.0]] {
+        for count in [10, 20, 60] {
+            let old = [first, &vec![1000.0; count]].concat();
+            assert_eq!(places(&old), [0usize; 0], "{first:?}, then {count}");
+            let new = [&old[..], &[1010.0; 8]].concat();
+            assert_eq!(places(&new), [old.len()], "{first:?}, then {count}");
+        }
+    }
+    let after = |last: &[f64]| places(&[&[1000.0; 30], last].concat());
+    for last in [&[1300.0, 900.0][..], &[1300.0, 999.0], &[1010.0, 990.0, 1300.0, 900.0]] {
+        assert_eq!(after(last), [0usize; 0], "{last:?}");
+    }
+    // The last value of a level that never repeats one is no level either.
+    for last in [[1002.0, 1004.0, 1003.0, 1001.0, 1005.0], [1200.0, 1400.0, 1300.0, 1100.0, 1500.0]]
+    {
+        assert_eq!(after(&last), [30], "{last:?}");
+    }
+}
+
 /// A level of 2000 that never repeats a value, after one of 1000 that always does.
 #[test]
 fn an_exact_counter_that_becomes_inexact_has_a_step() {
