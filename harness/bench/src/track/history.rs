@@ -1,7 +1,7 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
-//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
-//! in which their commits were made, so that a commit may be measured later than its successors; those without a time come first.
+//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts, and the last time and
+//! subject. Records are in the order in which their commits were made, so that a commit may be measured later than its successors.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`; a record without a machine is of the first. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
@@ -200,13 +200,18 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             Some(same) => {
                 same.metrics.extend(record.metrics);
                 same.accepted |= record.accepted;
+                same.time = record.time.or(same.time);
+                let subject = Some(record.subject).filter(|subject| !subject.is_empty());
+                subject.into_iter().for_each(|subject| same.subject = subject);
             }
-            None => {
-                // Without a time it follows the line before.
-                record.time = record.time.or(history.records.last().and_then(|last| last.time));
-                history.records.push(record);
-            }
+            None => history.records.push(record),
         }
+    }
+    // A commit whose time no line has follows the one before it.
+    let mut before = None;
+    for record in &mut history.records {
+        record.time = record.time.or(before);
+        before = record.time;
     }
     history.records.sort_by_key(|record| record.time);
     history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
@@ -273,9 +278,15 @@ mod tests {
         // By hand, without a time.
         let line = serde_json::json!({"schema": SCHEMA, "commit": "f", "metrics": {}});
         append(&path, &line).unwrap();
+        // A number of one's own, appended before the record of its commit.
+        append(&path, &serde_json::json!({"schema": SCHEMA, "commit": "d", "metrics": {"y": 1.0}}))
+            .unwrap();
+        let time = Some("2026-02-01T00:00:00Z".parse().unwrap());
+        append(&path, &Record { time, subject: "later".into(), ..record("d", &[]) }).unwrap();
         let records = read(&path).unwrap().records;
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
-        assert_eq!(commits, ["a", "b", "c", "e", "f"]);
+        assert_eq!(commits, ["a", "d", "b", "c", "e", "f"]);
+        assert_eq!((records[1].subject.as_str(), records[1].metrics["y"]), ("later", 1.0));
         let line = serde_json::to_string(&record("f", &[])).unwrap();
         fs::write(&path, line.replace("null", "\"noon\"") + "\n").unwrap();
         let error = read(&path).unwrap_err();
