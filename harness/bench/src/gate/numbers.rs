@@ -270,8 +270,9 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.timeout, &place));
-    // A program that fails without valgrind, too, states the cause; else it reports of which mesh the count is.
-    let options = RunOptions::new(&place, bench.options.timeout);
+    // A program that fails without valgrind, too, states the cause; else it reports of which mesh the count is. It may need an empty place.
+    let again = place.join("again");
+    let options = RunOptions::new(&again, bench.options.timeout);
     let report = engine.run(&path, &SERIAL, &options)?.report;
     counted?;
     match counted_by_all(&place) {

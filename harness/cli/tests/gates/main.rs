@@ -115,6 +115,27 @@ fn times_of_different_meshes_are_not_compared() {
     assert_ne!(same.code, 3, "{}", same.printed);
 }
 
+/// The program runs twice: under valgrind, and without.
+#[test]
+fn instructions_of_a_program_that_needs_an_empty_place_are_counted() {
+    let fixture = Fixture::new();
+    let rules = fs::read_to_string(fixture.path("gate.toml")).unwrap();
+    fixture.write("gate.toml", &rules.replace("counters", "instructions"));
+    let serial = "about = \"a script\"\nprogram = \"{here}/always\"\n[run]\nserial = [\"{program}\", \"{case}\", \"1\", \"--out\", \"{out}\"]\n";
+    fixture.write("always.toml", serial);
+    let script = fs::read_to_string(fixture.path("engine")).unwrap();
+    let refuses = "[ ! -e \"$out\" ] || exit 2\nbody=";
+    fixture.program("always", &script.replacen("body=", refuses, 1));
+    let counts = "#!/bin/sh\nwhile :; do case \"$1\" in --callgrind-out-file=*) file=${1#*=};; --*) ;; *) break;; esac; shift; done\n\
+                  echo totals: 7 >\"${file%.%p}.1\"\nexec \"$@\"\n";
+    fixture.program("bin/valgrind", counts);
+    let path = format!("{}:{}", fixture.path("bin").display(), std::env::var("PATH").unwrap());
+    let gate = "gate --engine always.toml --rules gate.toml --baseline always --candidate always";
+    let outcome = fixture.harness_with(gate, "PATH", &path);
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    assert!(outcome.printed.contains("1 unchanged"), "{}", outcome.printed);
+}
+
 #[test]
 fn a_baseline_without_a_mesh_has_no_correctness_to_compare_with() {
     let fixture = Fixture::new();
