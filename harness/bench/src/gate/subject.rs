@@ -22,6 +22,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::fs;
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -136,6 +137,8 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));
+    // A build that fails may have replaced the program.
+    let _ = fs::remove_file(&done);
     let (builder, arguments) =
         words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
     let mut command = Command::new(builder);
@@ -156,12 +159,17 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
 /// where MPI is.
 fn environment() -> String {
     let is_of_build = |name: &str| {
-        let is_of_tool = name.starts_with("CARGO_") || name.starts_with("RUST");
-        is_of_tool || name.ends_with("FLAGS") || ["CC", "CXX", "AR", "LD"].contains(&name)
+        let is_of_tool = name.starts_with("CARGO_") || name.starts_with("RUSTC");
+        let is_of_compiler = name.ends_with("FLAGS") || ["CC", "CXX", "AR", "LD"].contains(&name);
+        // Credentials, and what a terminal, make and `cargo run` set, change no build.
+        let others = ["TOKEN", "TERM", "PKG", "MANIFEST", "HOME", "MAKEFLAGS"];
+        (is_of_tool || is_of_compiler) && !others.iter().any(|part| name.contains(part))
     };
     let all = env::vars_os().filter(|(name, _)| name.to_str().is_some_and(is_of_build));
     let variables: BTreeSet<String> = all.map(|of| format!("{of:?}")).collect();
-    format!("{}\nmpicc: {:?}\n{variables:?}", compiler(), on_path("mpicc"))
+    // Values may be secret.
+    let digest = BuildHasherDefault::<DefaultHasher>::default().hash_one(variables);
+    format!("{}\nmpicc: {:?}\nvariables: {digest:x}", compiler(), on_path("mpicc"))
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.
