@@ -45,7 +45,9 @@ pub fn junit(report: &GateReport) -> String {
             let ended = match verdict {
                 Verdict::Regression => unsuccessful(Failure, &line(finding)),
                 Verdict::Missing => unsuccessful(Error, &format!("not compared: {note}")),
-                Verdict::Inconclusive | Verdict::LeftOut => skipped(format!("{verdict}: {note}")),
+                Verdict::Inconclusive | Verdict::LeftOut | Verdict::Accepted => {
+                    skipped(format!("{verdict}: {note}"))
+                }
                 _ => TestCaseStatus::success(),
             };
             test(format!("{case}: {metric}"), ended, &line(finding))
@@ -64,7 +66,11 @@ pub fn junit(report: &GateReport) -> String {
 fn verdict(report: &GateReport) -> String {
     let end = match report.end() {
         End::Holds(total) if report.baseline.is_some() => {
-            format!("nothing got worse in {total} comparisons")
+            let mut findings = report.layers.iter().flat_map(|layer| &layer.findings);
+            let accepted = findings.any(|finding| finding.verdict == Verdict::Accepted);
+            let also = "; other meshes were accepted, and their numbers not compared";
+            let also = if accepted { also } else { "" };
+            format!("nothing got worse in {total} comparisons{also}")
         }
         End::Holds(total) => format!("{total} quantities were measured, and no baseline was given"),
         End::Interrupted => "interrupted".to_owned(),

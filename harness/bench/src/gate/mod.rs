@@ -54,6 +54,9 @@ pub struct GateOptions {
     /// Exit code 3 if a layer or a case of it was left out
     #[arg(long)]
     pub require_layers: bool,
+    /// Accept that meshes differ from the baseline's: then nothing but their correctness is compared, and the gate may hold
+    #[arg(long)]
+    pub accept_meshes: bool,
     /// Seed of the order of runs and of the permutation tests
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

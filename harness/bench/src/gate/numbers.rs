@@ -87,8 +87,9 @@ fn judged(
     layer: LayerName,
     mut pair: [CaseMeasures; 2],
 ) -> Vec<GateFinding> {
+    let is_accepted = bench.options.accept_meshes;
     let compared = |[old, new]: &[CaseMeasures; 2]| {
-        compare(&case.name, layer, [old, new], &bench.rules.tolerance)
+        compare(&case.name, layer, [old, new], &bench.rules.tolerance, is_accepted)
     };
     let mut findings = compared(&pair);
     let of_runs = if layer == LayerName::Memory { CONFIRMATIONS } else { 0 };
@@ -113,6 +114,7 @@ fn compare(
     layer: LayerName,
     [old, new]: [&CaseMeasures; 2],
     tolerance: &Tolerance,
+    is_accepted: bool,
 ) -> Vec<GateFinding> {
     let noted = |metric: &str, verdict, note| GateFinding::noted(case, metric, verdict, note);
     if let (Some(one), Some(other)) = (&old.geometry, &new.geometry)
@@ -122,8 +124,8 @@ fn compare(
         return vec![noted("geometry", Verdict::Missing, why)];
     }
     let meshes = [old, new].map(|of| (of.digest.as_deref(), of.exact.get(CELLS).copied()));
-    if let Some(why) = other_mesh(meshes) {
-        return vec![noted("digest", Verdict::Missing, why)];
+    if let Some((verdict, why)) = other_mesh(meshes, is_accepted) {
+        return vec![noted("digest", verdict, why)];
     }
     let mesh = (layer == LayerName::Counters).then(|| same_mesh(case, [&old.digest, &new.digest]));
     let mut findings: Vec<GateFinding> = mesh.flatten().into_iter().collect();
@@ -152,14 +154,15 @@ pub(super) type Mesh<'a> = (Option<&'a str>, Option<u64>);
 
 /// Why numbers of two programs are not comparable: their meshes have different digests, or different numbers of cells and not both a digest.
 /// The layer of correctness decides which of them is correct.
-pub(super) fn other_mesh([old, new]: [Mesh; 2]) -> Option<String> {
+pub(super) fn other_mesh([old, new]: [Mesh; 2], is_accepted: bool) -> Option<(Verdict, String)> {
     let (what, old, new) = match (old, new) {
         ((Some(old), _), (Some(new), _)) => ("digest", old.to_owned(), new.to_owned()),
         ((_, Some(old @ 1..)), (_, Some(new @ 1..))) => ("cells", grouped(old), grouped(new)),
         _ => return None,
     };
     let why = "the mesh is another one, so that its numbers are not comparable";
-    (old != new).then(|| format!("{why}: {what} {new}, and {old} in the baseline"))
+    let verdict = if is_accepted { Verdict::Accepted } else { Verdict::Missing };
+    (old != new).then(|| (verdict, format!("{why}: {what} {new}, and {old} in the baseline")))
 }
 
 /// The finding on a digest that is the same if both sides have one. `None` if neither has.
@@ -322,7 +325,7 @@ mod tests {
             memory: numbers.clone(),
             ..CaseMeasures::default()
         });
-        let found = compare("c", layer, [&old, &new], &tolerance);
+        let found = compare("c", layer, [&old, &new], &tolerance, false);
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 
@@ -365,7 +368,7 @@ mod tests {
             (of(None, 0), of(None, 40), true),
         ] {
             for layer in [LayerName::Counters, LayerName::Memory, LayerName::Instructions] {
-                let found = compare("c", layer, [&old, &new], &Tolerance::default());
+                let found = compare("c", layer, [&old, &new], &Tolerance::default(), false);
                 let is_missing = found.iter().all(|finding| finding.verdict == Verdict::Missing);
                 assert_eq!(is_missing, !holds, "{layer}: {found:?}");
                 assert!(holds || found[0].note.contains("the mesh is another one"), "{found:?}");

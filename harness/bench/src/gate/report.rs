@@ -3,7 +3,7 @@
 //! Invariants, executed by [`GateReport::check_invariants`] before it is printed:
 //! - every case that a layer was asked for has a finding in it, unless the layer was left out or interrupted, and no other case has one;
 //! - a change is that of the two values beside it, and a verdict for the worse or better has the sign of its change;
-//! - a finding that was left out or is missing compared nothing.
+//! - a finding that was left out, accepted or is missing compared nothing.
 //!
 //! [`End::Holds`] carries the number of comparisons, which is not 0: a report that compared nothing of a case that it was asked for
 //! cannot hold.
@@ -23,6 +23,8 @@ pub enum Verdict {
     /// Not examined, because a prerequisite is missing, for the reason in the note.
     #[default]
     LeftOut,
+    /// Not compared, because the mesh is another one, which the user accepts.
+    Accepted,
     /// Measured, and nothing was given to compare with.
     Measured,
     /// Better than the baseline.
@@ -92,7 +94,7 @@ impl GateFinding {
             };
             assert!(is_right, "the verdict has the sign of the change: {self:?}");
         }
-        let is_empty = matches!(self.verdict, Verdict::LeftOut | Verdict::Missing);
+        let is_empty = self.verdict <= Verdict::Accepted || self.verdict == Verdict::Missing;
         assert!(!is_empty || self.compared == 0, "nothing was compared: {self:?}");
     }
 }
@@ -211,7 +213,9 @@ impl GateReport {
             let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
             let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
             let all_left_out = of_case().next().is_some() && of_case().all(is_left_out);
-            let is_excused = !self.require_layers && (layer.left_out.is_some() || all_left_out);
+            let is_accepted = of_case().any(|finding| finding.verdict == Verdict::Accepted);
+            let is_excused =
+                is_accepted || !self.require_layers && (layer.left_out.is_some() || all_left_out);
             if !is_excused && of_case().all(|finding| finding.compared == 0) {
                 let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
                 let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));

@@ -99,7 +99,7 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
     // The first run reads program and geometry from disk and is not counted.
     let runs = [run(0)?, run(CANDIDATE)?];
     let meshes = runs.each_ref().map(|of| (of.report.digest.as_deref(), Some(of.report.cells)));
-    other_mesh(meshes).map_or(Ok(()), |why| Err((Verdict::Missing, why)))?;
+    other_mesh(meshes, bench.options.accept_meshes).map_or(Ok(()), Err)?;
     let [first, also] = runs.map(|run| run.finished);
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget.as_secs_f64());

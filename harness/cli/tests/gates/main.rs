@@ -115,6 +115,39 @@ fn times_of_different_meshes_are_not_compared() {
     assert_ne!(same.code, 3, "{}", same.printed);
 }
 
+/// Meshes that change on purpose: their numbers are not compared, but their correctness is.
+#[test]
+fn other_meshes_hold_if_they_are_accepted_and_something_was_compared() {
+    let fixture = Fixture::new();
+    let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
+    fixture.write("case.toml", &case.replace("spacing_min = 1.0", "spacing_min = 8.0"));
+    let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    fixture.write("engine.toml", &(engine + "[promises]\ncomplete = true\n"));
+    let rules = "[[case]]\nname = \"case.toml\"\nlayers = [\"correctness\", \"counters\", \"memory\", \"time\"]\n";
+    fixture.write("gate.toml", rules);
+    let script = fs::read_to_string(fixture.path("engine")).unwrap();
+    fixture.program("other", &script.replace("mesh=right cells=1", "mesh=wrong cells=8"));
+    let accepting = "gate --engine engine.toml --rules gate.toml --baseline engine --require-layers --accept-meshes";
+    let outcome = fixture.harness(&format!("{accepting} --candidate other --json gate.json"));
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    for part in [
+        "accepted     case: digest; the mesh is another one",
+        "accepted     case: time; the mesh is another one",
+        "; other meshes were accepted, and their numbers not compared",
+    ] {
+        assert!(outcome.printed.contains(part), "{part}: {}", outcome.printed);
+    }
+    let json = fs::read_to_string(fixture.path("gate.json")).unwrap();
+    assert_eq!(json.matches("\"verdict\": \"accepted\"").count(), 3, "{json}");
+    let nothing = fixture.harness(&format!("{accepting} --candidate other --layers counters"));
+    let why = "INCOMPLETE: nothing was compared";
+    assert!(nothing.code == 3 && nothing.printed.contains(why), "{}", nothing.printed);
+    // What is no other mesh is judged as ever.
+    fixture.engine("more", 1);
+    let more = fixture.harness(&format!("{accepting} --candidate more --layers counters"));
+    assert_eq!(more.code, 1, "{}", more.printed);
+}
+
 /// The program runs twice: under valgrind, and without.
 #[test]
 fn instructions_of_a_program_that_needs_an_empty_place_are_counted() {
