@@ -102,7 +102,11 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
             let why = before.filter(|old| old.failed()).map_or(why, first_line);
             noted(Verdict::Missing, format!("{who} a mesh: {why}"))
         }
-        (_, None) => noted(verdict, format!("the baseline's was not checked: {why}")),
+        (_, None) => {
+            let ended = before.map_or("its verification ended before", first_line);
+            let why = if why.is_empty() { ended } else { why };
+            noted(verdict, format!("the baseline's was not checked: {why}"))
+        }
         (_, Some(old)) => noted(verdict, why.to_owned()).of_values([old, new].map(|n| n as f64)),
     })
 }
@@ -165,6 +169,8 @@ mod tests {
         candidate.checks.push(Check::new("serial", RUNS, Outcome::held(2)));
         let all = findings(&on(&[]), &candidate, Some(&baseline));
         assert!(all.iter().all(|finding| finding.compared == 0), "{all:?}");
+        let other = all.iter().find(|finding| finding.metric == "serial: layer").unwrap();
+        assert!(other.note.ends_with("not checked: its verification ended before"), "{other:?}");
         let worst = all.iter().max_by_key(|finding| finding.verdict).unwrap();
         assert_eq!(worst.verdict, Verdict::Missing);
         assert_eq!(worst.note, "the baseline does not make a mesh: it crashes");
