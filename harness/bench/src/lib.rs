@@ -38,11 +38,12 @@ fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
 pub fn shown(words: impl IntoIterator<Item = impl AsRef<OsStr>>) -> String {
     let word = |word: &OsStr| {
         let name = Path::new(word).file_name().filter(|_| Path::new(word).is_absolute());
-        name.unwrap_or(word).to_string_lossy().into_owned()
+        // A record may have zero bytes, which no argument of a process has.
+        name.unwrap_or(word).to_string_lossy().replace('\0', "\u{fffd}")
     };
     let words: Vec<String> = words.into_iter().map(|of| word(of.as_ref())).collect();
     let line = shlex::try_join(words.iter().map(String::as_str));
-    line.expect("an argument of a process has no zero bytes")
+    line.expect("zero bytes were replaced")
 }
 
 /// Returns what git prints in a directory; `None` if it fails.

@@ -181,6 +181,7 @@ mod tests {
     fn a_shown_command_contains_no_directory_of_the_machine() {
         let command = ["/opt/bin/mpirun", "-n", "2", "/opt/bin/mesher", "/tmp/x/a uav.toml"];
         assert_eq!(shown(command), "mpirun -n 2 mesher 'a uav.toml'");
+        assert!(shown(["harness", "be\0nch"]).contains("be\u{fffd}nch"));
     }
 
     // An engine that is not ours.
