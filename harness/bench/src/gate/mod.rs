@@ -55,7 +55,7 @@ pub struct GateOptions {
     #[arg(long)]
     pub require_layers: bool,
     /// Accept that meshes differ from the baseline's: then nothing but their correctness is compared, and the gate may hold
-    #[arg(long)]
+    #[arg(long, requires = "baseline")]
     pub accept_meshes: bool,
     /// Seed of the order of runs and of the permutation tests
     #[arg(long, default_value_t = 1)]

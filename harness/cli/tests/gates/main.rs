@@ -142,6 +142,8 @@ fn other_meshes_hold_if_they_are_accepted_and_something_was_compared() {
     let nothing = fixture.harness(&format!("{accepting} --candidate other --layers counters"));
     let why = "INCOMPLETE: nothing was compared";
     assert!(nothing.code == 3 && nothing.printed.contains(why), "{}", nothing.printed);
+    let alone = "gate --engine engine.toml --rules gate.toml --accept-meshes";
+    assert_eq!(fixture.harness(alone).code, 2, "nothing to accept");
     // What is no other mesh is judged as ever.
     fixture.engine("more", 1);
     let more = fixture.harness(&format!("{accepting} --candidate more --layers counters"));
