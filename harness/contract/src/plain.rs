@@ -4,8 +4,7 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
-use crate::failure::{Failure, Result};
-use crate::files;
+use crate::failure::Result;
 use serde::Deserialize;
 use std::fs;
 use std::io;
@@ -27,13 +26,12 @@ impl PlainCase {
     /// # Errors
     /// One sentence, if it is not a valid case.
     pub fn read(path: &Path) -> Result<Self> {
-        let case = Case::read(path)?;
-        let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
-        let mut table: Table = toml::from_str(&text).map_err(|why| Failure::about(path, why))?;
-        table.retain(|key, _| !["geometry", "generator", "root_scale"].contains(&key));
-        let root = Value::try_from(case.root).expect("a root is representable in TOML");
-        table.insert("root".into(), root);
-        Ok(Self { table, facets: case.facets })
+        Ok(Self::of(&Case::read(path)?))
+    }
+
+    /// A case in this form.
+    pub fn of(case: &Case) -> Self {
+        Self { table: case.table.clone(), facets: case.facets.clone() }
     }
 
     /// Writes `case.toml` and `body.stl` into a directory, which is made, and returns the path of the case file.

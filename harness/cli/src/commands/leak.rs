@@ -52,9 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let path = paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
     let place = tempfile::tempdir()?;
-    let plain = PlainCase::read(&path)?;
     let tree = |level: u8| -> Result<LeafSet> {
-        let mut plain = plain.clone();
+        let mut plain = PlainCase::of(&case);
         if level != case.level_surface {
             // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
             plain.table.remove("seeds");
