@@ -63,7 +63,7 @@ impl Leaves {
         export.mesh.leaves(&|| export.options.watch.check(), &|_| true, &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
-                let word = word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side });
+                let word = word::encode(leaf.octant, leaf.side);
                 words.push(if is_selected { word } else { word | CUT });
             }
             Ok(())
@@ -147,7 +147,7 @@ impl Leaves {
         visit: Visit,
     ) -> Result<()> {
         if let Content::Cell(number) = around.content {
-            options.check_at(u64::from(number))?;
+            options.watch.check()?;
             self.squares(around, squares);
             return visit(number, &around.octant, squares);
         }

@@ -89,7 +89,7 @@ mod tests {
     fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>> {
         let mut words = Vec::new();
         selection.visit(mesh, &|| Ok(()), &mut |leaf| {
-            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
+            words.push(word::encode(leaf.octant, leaf.side));
             Ok(())
         })?;
         Ok(words)
@@ -117,7 +117,7 @@ mod tests {
                 assert_eq!(leaf.index, index);
                 index += 1;
                 expected.extend(selection.has(&leaf).then(|| {
-                    word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
+                    word::encode(leaf.octant, leaf.side)
                 }));
                 Ok(())
             }).unwrap();
@@ -131,8 +131,7 @@ mod tests {
         let mut swapped = leaves.clone();
         swapped.swap(2, 3);
         let mut overlapping = leaves.clone();
-        overlapping
-            .insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
+        overlapping.insert(0, word::encode(Octant::ROOT, Side::Inside));
         let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
         for (leaves, expected) in [
             (swapped, "precedes the leaf before"),

@@ -10,7 +10,7 @@ use contract::manifest::{Manifest, Tree};
 use contract::mesh::Leaf;
 use contract::mesh::Mesh;
 use contract::testing::random_words;
-use contract::word::{self, Leaf as WordLeaf};
+use contract::word;
 use export::options::{Export, Label, Options, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
@@ -66,7 +66,7 @@ fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
     let mut leaves = Vec::new();
     selection
         .visit(mesh, &|| Ok(()), &mut |Leaf { octant, side, index, .. }| {
-            leaves.push((word::encode(&WordLeaf { octant, side }), index));
+            leaves.push((word::encode(octant, side), index));
             Ok(())
         })
         .unwrap();

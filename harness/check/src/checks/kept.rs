@@ -17,7 +17,7 @@ use contract::lattice::cell_at;
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides, Tree as Kind};
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 
 pub(super) const CHECK: Check =
     Check { name: "kept", wanted: |subject| subject.promises.definition, run };
@@ -141,7 +141,7 @@ fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
     tree.walk(&mut |octant, handle| {
         let kinds = tree.kinds(handle);
         let one = [Side::Outside, Side::Inside].into_iter().find(|&s| kinds == 1 << s as u8);
-        words.extend(one.map(|side| word::encode(&Leaf { octant, side })));
+        words.extend(one.map(|side| word::encode(octant, side)));
         one.is_none() && words.len() <= OCTANTS_MAX
     });
     (words.len() <= OCTANTS_MAX).then_some(words)
