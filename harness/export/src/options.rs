@@ -94,16 +94,6 @@ pub enum Regions {
     Largest,
 }
 
-impl Options<'_> {
-    /// Whether to continue in a loop of fast steps, of which `count` are done. Most calls do not ask.
-    ///
-    /// # Errors
-    /// If the user has interrupted the export.
-    pub fn check_at(&self, count: u64) -> Result<()> {
-        if count.is_multiple_of(1 << 14) { self.watch.check() } else { Ok(()) }
-    }
-}
-
 /// Refuses to replace a file, or a directory with something in it: what exists may be the only copy of a body, or the case of a solver.
 ///
 /// # Errors

@@ -109,8 +109,8 @@ impl<'a> ListFile<'a> {
     fn list<T: NoUninit>(&mut self, n: u64, items: impl Iterator<Item = T>) -> Result<()> {
         let [begin, end] = if n == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{n}\n{begin}")?;
-        for (item, number) in items.zip(0..) {
-            self.options.check_at(number)?;
+        for item in items {
+            self.options.watch.check()?;
             self.out.write_all(bytemuck::bytes_of(&item))?;
         }
         Ok(writeln!(self.out, "{end}")?)
