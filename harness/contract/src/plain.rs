@@ -4,7 +4,6 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
-use crate::failure::Result;
 use serde::Deserialize;
 use std::fs;
 use std::io;
@@ -21,14 +20,6 @@ pub struct PlainCase {
 }
 
 impl PlainCase {
-    /// Reads a case file and the body that it names or generates.
-    ///
-    /// # Errors
-    /// One sentence, if it is not a valid case.
-    pub fn read(path: &Path) -> Result<Self> {
-        Ok(Self::of(&Case::read(path)?))
-    }
-
     /// A case in this form.
     pub fn of(case: &Case) -> Self {
         Self { table: case.table.clone(), facets: case.facets.clone() }
@@ -101,7 +92,7 @@ mod tests {
             let path = place.path().join("given.toml");
             fs::write(&path, CASE.replace("FACETS", facets)).unwrap();
             let given = Case::read(&path).unwrap();
-            let plain = PlainCase::read(&path).unwrap().write(place.path(), form).unwrap();
+            let plain = PlainCase::of(&given).write(place.path(), form).unwrap();
             let is_text =
                 fs::read(place.path().join("body.stl")).unwrap().starts_with(b"solid body");
             assert_eq!(is_text, text && (form == StlForm::Ascii || facets == "20"));
