@@ -20,7 +20,7 @@ use std::fmt::Display;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 use contract::files::fill_atomically;
 use contract::lattice::Root;
 use contract::number::number;
@@ -66,11 +66,10 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
     // Without crossing leaves, exposed faces are those at holes.
     let leaves = Leaves::read(export, &mut |leaf, _| leaf.side != Side::Crossing)?;
     let (mut faces, mut words) = (Vec::new(), leaves.cells());
-    leaves.walk(export.options, &mut |_, _, squares| {
+    leaves.walk(&mut |_, _, squares| {
         let leaf = words.next().expect("cells are visited in the order of their words");
         let exposed = squares.iter().filter(|square| square.across == Content::Hole);
         faces.extend(exposed.map(|&square| Face { square, leaf }));
-        Ok(())
     })?;
     Ok(faces)
 }
@@ -138,7 +137,7 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
         out.flush().map_err(|error| Failure::at(path, error))?;
-        export.options.watch.check()
+        Progress.check()
     })?;
     let closed = match open {
         0 => "closed".to_owned(),
