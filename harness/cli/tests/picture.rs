@@ -105,7 +105,11 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         ("mesh --out no/a.svg", 2, "no is not a directory"),
         ("mesh --out a.svg --ranks 2", 2, "is meshed already"),
         ("mesh --out a.svg --ungraded", 2, "is meshed already"),
-        ("mesh --out a.svg --case x.stl", 2, "x.stl is a geometry: give a case file"),
+        (
+            "mesh --out a.svg --case x.stl",
+            2,
+            "x.stl is neither the name of a case nor a case file: give CASE.toml",
+        ),
         ("mesh --out a.svg --slice z=9", 2, "--slice z=9"),
         ("mesh --out a.svg --slice z=0 --level-max 0", 2, "no leaf of the selection"),
         ("mesh --out a.svg --slice z=0 --clip -1,-1,0.3,1,1,0.9", 2, "no leaf of the selection"),

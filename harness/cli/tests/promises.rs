@@ -8,7 +8,7 @@
 
 use contract::npy;
 use contract::octant::{CELLS_PER_EDGE, Octant};
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
@@ -140,7 +140,7 @@ fn words(merged: &[[u32; 4]]) -> Vec<u64> {
         match split(&octant) {
             true => stack.extend((0..8).map(|digit| octant.child(digit))),
             // A mesh without sides: the code of every leaf is 0.
-            false => words.push(word::encode(&Leaf { octant, side: Side::Outside })),
+            false => words.push(word::encode(octant, Side::Outside)),
         }
     }
     words.sort_unstable();

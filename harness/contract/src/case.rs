@@ -2,10 +2,12 @@
 
 use crate::failure::{Failure, Result};
 use crate::files;
+use std::collections::BTreeSet;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use toml::{Table, Value};
 
 use crate::lattice::{FacetLattice, Root};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
@@ -29,6 +31,8 @@ pub struct Case {
     pub seeds: Vec<[f64; 3]>,
     /// The root and the rules, on the lattice: the manifest of a mesh without leaves.
     pub rules: Manifest,
+    /// The case file without its geometry, with the root that the geometry gives it.
+    pub table: Table,
 }
 
 impl Deref for Case {
@@ -77,7 +81,7 @@ impl Case {
         let text = files::read_text(path).map_err(|error| Failure::about(path, error))?;
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
-            toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
+            toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, DEFINITION)))?;
         let Body { facets, solids } = match (&file.geometry, &file.generator) {
             (Some(stl), None) => stl::read(&path.with_file_name(stl))?,
             (None, Some(generator)) => {
@@ -87,7 +91,8 @@ impl Case {
             _ => return Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
         };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { solids, ..Self::build(name, &file, facets).map_err(|why| why.of_file(path))? })
+        let case = Self::build(name, (&text, &file), facets).map_err(|why| why.of_file(path))?;
+        Ok(Self { solids, ..case })
     }
 
     /// A case from the text of a case file without geometry, and from a body in memory.
@@ -95,11 +100,11 @@ impl Case {
     /// # Errors
     /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
-        let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e, &EXAMPLES))?;
-        Self::build("in-memory".to_owned(), &file, facets).map_err(|failure| failure.why)
+        let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e, DEFINITION))?;
+        Self::build("in-memory".to_owned(), (text, &file), facets).map_err(|failure| failure.why)
     }
 
-    fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self> {
+    fn build(name: String, (text, file): (&str, &CaseFile), facets: Vec<Facet>) -> Result<Self> {
         let mut vertices = facets.as_flattened().iter().enumerate();
         if let Some((i, [x, y, z])) = vertices.find(|(_, v)| !v.iter().all(|c| c.is_finite())) {
             let facet = i / 3;
@@ -139,7 +144,11 @@ impl Case {
             ..Manifest::without_leaves(Tree::Final, root, String::new())
         };
         let (facets_lattice, seeds) = (on_lattice(&root, &facets)?, file.seeds.clone());
-        let case = Self { name, solids: Vec::new(), facets, facets_lattice, seeds, rules };
+        let mut table: Table = text.parse().expect("what was read is TOML");
+        table.retain(|key, _| !["geometry", "generator", "root_scale"].contains(&key));
+        let of_root = Value::try_from(root).expect("a root is representable in TOML");
+        table.insert("root".into(), of_root);
+        let case = Self { name, solids: Vec::new(), facets, facets_lattice, seeds, rules, table };
         for (i, (&seed, at)) in case.rules.seeds.iter().zip(&case.seeds).enumerate() {
             if let (leaf, Some(facet)) = case.base_leaf_at(seed, &case.facets_lattice) {
                 let leaf = root.place(leaf);
@@ -211,20 +220,11 @@ fn positive(what: &str, value: f64) -> Result<()> {
     Failure::unless(value.is_finite() && value > 0.0, why)
 }
 
-/// Examples of keys of a case file.
-const EXAMPLES: [(&str, &str); 8] = [
-    ("geometry", "geometry = 'DIRECTORY/FILE.stl', in single quotes"),
-    ("spacing_min", "spacing_min = 0.01"),
-    ("layer_cells_min", "layer_cells_min = 4"),
-    ("keep", "keep = \"outside\""),
-    ("keep_crossing", "keep_crossing = true"),
-    ("root_scale", "root_scale = 10.0"),
-    ("origin", "origin = [-1.0, -1.0, -1.0]"),
-    ("edge", "edge = 2.0"),
-];
+/// The page that has an example of every key.
+const DEFINITION: &str = include_str!("../../../reference/DEFINITION.md");
 
-/// A TOML error in one line, with the line of the file, counted from 1, the key or table on it, and an example of the key if there is one.
-pub fn explain(text: &str, error: &toml::de::Error, examples: &[(&str, &str)]) -> String {
+/// A TOML error in one line, with the line of the file, counted from 1, the key or table on it, and the examples of the key in a page.
+pub fn explain(text: &str, error: &toml::de::Error, page: &str) -> String {
     let message = error.message().replace("expected f64", "expected a number").replace('\n', " ");
     let at = error.span().map_or(0, |span| span.start);
     let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
@@ -233,8 +233,11 @@ pub fn explain(text: &str, error: &toml::de::Error, examples: &[(&str, &str)]) -
     let key = line.split('=').next().unwrap_or_default().trim();
     let is_missing = message.starts_with("missing");
     let wrong = if is_missing { message.split('`').nth(1).unwrap_or_default() } else { key };
-    let example = examples.iter().find(|(name, _)| *name == wrong);
-    let example = example.map_or_else(String::new, |(_, of)| format!("; for example {of}"));
+    let lines = page.lines().map(|line| line.trim_start_matches(['#', '|', '`', ' ']));
+    let of_key = lines.filter(|line| line.split_once(" = ").is_some_and(|of| of.0 == wrong));
+    let examples = of_key.filter_map(|line| Some(line.split(['#', '`']).next()?.trim()));
+    let example = Vec::from_iter(examples.collect::<BTreeSet<_>>()).join(" or ");
+    let example = if example.is_empty() { example } else { format!("; for example {example}") };
     match at == 0 && is_missing {
         // Of the file as a whole.
         true => message + &example,
@@ -360,7 +363,7 @@ mod tests {
         let text = "spacing_min = 1.0\n\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 'long'";
         assert!(why(text).starts_with("line 5, edge: invalid type: string"), "{}", why(text));
         let without_edge = why("spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]");
-        assert_eq!(without_edge, "line 2, [root]: missing field `edge`; for example edge = 2.0");
+        assert_eq!(without_edge, "line 2, [root]: missing field `edge`; for example edge = 8.0");
         let both = "spacing_min = 1.0\nroot_scale = inf";
         assert_eq!(why(both), "root_scale = inf must be finite and greater than zero");
         let root = "spacing_min = 1.0\n[root]\norigin = [0.0, nan, 0.0]\nedge = 8.0";
@@ -389,7 +392,7 @@ mod tests {
         for path in [r#""C:\Users\me\a.stl""#, "parts/a.stl", "12"] {
             let why = why(&format!("spacing_min = 1.0\ngeometry = {path}"));
             assert!(
-                why.starts_with("line 2, geometry: ") && why.contains("single quotes"),
+                why.starts_with("line 2, geometry: ") && why.contains("geometry = 'uav.stl'"),
                 "{why}"
             );
         }

@@ -117,7 +117,7 @@ impl TryFrom<String> for Digest {
 mod tests {
     use super::*;
     use crate::octant::Octant;
-    use crate::word::{Leaf, Side, encode};
+    use crate::word::{Side, encode};
 
     #[test]
     fn a_digest_depends_neither_on_order_nor_on_parts() {
@@ -133,7 +133,7 @@ mod tests {
         for depth in 0..=4u8 {
             for level in [depth + 3, 11, 19] {
                 let octant = Octant { corner: [1 << 18, 3 << 16, 5 << 16], level: level - depth };
-                let first = encode(&Leaf { octant, side: Side::Crossing });
+                let first = encode(octant, Side::Crossing);
                 let block = Block { first: first + (u64::from(depth) << 2), depth };
                 let words: Vec<u64> = block.words().collect();
                 let expected = octant.contains(&crate::word::octant(words[words.len() - 1]));

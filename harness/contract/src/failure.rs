@@ -2,8 +2,9 @@
 //! interrupt it.
 
 use std::fmt::Display;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, IsTerminal, Write, stderr};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code: all checks hold.
 pub const EXIT_HOLDS: u8 = 0;
@@ -111,9 +112,6 @@ pub trait Watch: Sync {
     /// A step begins.
     fn step(&self, _what: &str) {}
 
-    /// `done` of `total` leaves are written.
-    fn progress(&self, _done: u64, _total: u64) {}
-
     /// Whether the user has interrupted it.
     fn is_interrupted(&self) -> bool;
 
@@ -123,6 +121,31 @@ pub trait Watch: Sync {
     /// If the user has interrupted it.
     fn check(&self) -> Result<(), Failure> {
         if self.is_interrupted() { Err(Failure::interrupted()) } else { Ok(()) }
+    }
+}
+
+/// Whether the user has interrupted the program.
+pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// The user of this program: steps are a line on standard error, which is empty at first, only if that is a terminal.
+pub struct Progress;
+
+impl Progress {
+    /// Removes the line.
+    pub fn finish(&self) {
+        self.step("");
+    }
+}
+
+impl Watch for Progress {
+    fn step(&self, what: &str) {
+        if stderr().is_terminal() {
+            let _ = write!(stderr().lock(), "\r\x1b[K{what}");
+        }
+    }
+
+    fn is_interrupted(&self) -> bool {
+        INTERRUPTED.load(Ordering::SeqCst)
     }
 }
 

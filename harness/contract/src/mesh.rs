@@ -8,7 +8,7 @@
 
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::{Failure, Result};
+use crate::failure::{Failure, Progress, Result, Watch};
 use crate::htg::{Block, TreeError, TreeFile};
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
@@ -57,8 +57,6 @@ pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Block]) -> Result<()>;
 
 /// Visits a leaf; its error ends the traversal.
 pub type Each<'a> = &'a mut dyn FnMut(Leaf) -> Result<()>;
-/// Asks whether to continue; its error ends a visit.
-pub type Check<'a> = &'a dyn Fn() -> Result<()>;
 
 impl Mesh {
     /// Opens a leaf-set directory.
@@ -141,20 +139,14 @@ impl Mesh {
         visited
     }
 
-    /// Visits the leaves in those octants that `takes` accepts, in Morton order. All are read. `check` is called from time to time.
+    /// Visits the leaves in those octants that `takes` accepts, in Morton order. All are read.
     ///
     /// # Errors
-    /// As [`Mesh::visit`], or if the leaves do not have the digest in the manifest; or the first error of `check` or `visit`, which ends
-    /// the traversal.
-    pub fn leaves(
-        &self,
-        check: Check<'_>,
-        takes: &dyn Fn(&Octant) -> bool,
-        visit: Each<'_>,
-    ) -> Result<()> {
+    /// As [`Mesh::visit`], if the leaves do not have the digest in the manifest, or if the user interrupts.
+    pub fn leaves(&self, takes: &dyn Fn(&Octant) -> bool, visit: Each<'_>) -> Result<()> {
         let (mut index, mut digest) = (0u64, Digest::default());
         self.visit(&mut |part, blocks| {
-            check()?;
+            Progress.check()?;
             for block in blocks {
                 let (rank, side) = (part as u32, word::side(block.first));
                 if takes(&block.octant()) {

@@ -4,8 +4,6 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
-use crate::failure::{Failure, Result};
-use crate::files;
 use serde::Deserialize;
 use std::fs;
 use std::io;
@@ -22,18 +20,9 @@ pub struct PlainCase {
 }
 
 impl PlainCase {
-    /// Reads a case file and the body that it names or generates.
-    ///
-    /// # Errors
-    /// One sentence, if it is not a valid case.
-    pub fn read(path: &Path) -> Result<Self> {
-        let case = Case::read(path)?;
-        let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
-        let mut table: Table = toml::from_str(&text).map_err(|why| Failure::about(path, why))?;
-        table.retain(|key, _| !["geometry", "generator", "root_scale"].contains(&key));
-        let root = Value::try_from(case.root).expect("a root is representable in TOML");
-        table.insert("root".into(), root);
-        Ok(Self { table, facets: case.facets })
+    /// A case in this form.
+    pub fn of(case: &Case) -> Self {
+        Self { table: case.table.clone(), facets: case.facets.clone() }
     }
 
     /// Writes `case.toml` and `body.stl` into a directory, which is made, and returns the path of the case file.
@@ -103,7 +92,7 @@ mod tests {
             let path = place.path().join("given.toml");
             fs::write(&path, CASE.replace("FACETS", facets)).unwrap();
             let given = Case::read(&path).unwrap();
-            let plain = PlainCase::read(&path).unwrap().write(place.path(), form).unwrap();
+            let plain = PlainCase::of(&given).write(place.path(), form).unwrap();
             let is_text =
                 fs::read(place.path().join("body.stl")).unwrap().starts_with(b"solid body");
             assert_eq!(is_text, text && (form == StlForm::Ascii || facets == "20"));

@@ -10,7 +10,7 @@ use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Tree};
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::triangle::Triangle;
-use crate::word::{self, Leaf, Side};
+use crate::word::{self, Side};
 
 /// The leaves of the tree in which an octant is split iff `split` returns true, all with side outside.
 pub fn words_of(split: impl Fn(&Octant) -> bool) -> Vec<u64> {
@@ -28,7 +28,7 @@ pub fn words_with_sides(
         if split(&octant) {
             stack.extend((0..8).map(|d| octant.child(d)));
         } else if let Some(side) = side(&octant) {
-            words.push(word::encode(&Leaf { octant, side }));
+            words.push(word::encode(octant, side));
         }
     }
     words.sort_unstable();
@@ -46,7 +46,7 @@ pub fn base_tree(facets: &[FacetLattice], level: impl Fn(&Octant) -> u8) -> Vec<
             return (0..8).for_each(|d| refine(octant.child(d), &crossing, level, words));
         }
         let side = if crossing.is_empty() { Side::Outside } else { Side::Crossing };
-        words.push(word::encode(&Leaf { octant, side }));
+        words.push(word::encode(octant, side));
     }
     let facets: Vec<Triangle> = facets.iter().map(Triangle::new).collect();
     let mut words = Vec::new();

@@ -40,15 +40,6 @@ impl fmt::Display for Side {
     }
 }
 
-/// One leaf, unpacked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Leaf {
-    /// Its octant.
-    pub octant: Octant,
-    /// Its side.
-    pub side: Side,
-}
-
 /// Spreads the low 19 bits of `v`, with two zero bits after each.
 fn spread(v: u32) -> u64 {
     let mut x = u64::from(v);
@@ -135,18 +126,9 @@ impl Order {
     }
 }
 
-/// Packs a leaf.
-pub fn encode(leaf: &Leaf) -> u64 {
-    key_of(leaf.octant.corner) << 7 | u64::from(leaf.octant.level) << 2 | leaf.side as u64
-}
-
-/// Unpacks a word.
-///
-/// # Errors
-/// If the word is not a leaf.
-pub fn decode(word: u64) -> Result<Leaf, String> {
-    check(word)?;
-    Ok(Leaf { octant: octant(word), side: side(word) })
+/// The word of a leaf.
+pub fn encode(octant: Octant, side: Side) -> u64 {
+    key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | side as u64
 }
 
 /// The octant of a valid word.
@@ -191,9 +173,10 @@ mod tests {
         #[test]
         fn decoding_inverts_encoding(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE,
                            level in 0..=LEVEL_MAX, side in 0usize..3) {
-            let octant = Octant { corner: [x, y, z], level: LEVEL_MAX }.ancestor(level);
-            let leaf = Leaf { octant, side: Side::ALL[side] };
-            prop_assert_eq!(decode(encode(&leaf)), Ok(leaf));
+            let leaf = Octant { corner: [x, y, z], level: LEVEL_MAX }.ancestor(level);
+            let word = encode(leaf, Side::ALL[side]);
+            prop_assert_eq!(check(word), Ok(()));
+            prop_assert_eq!((octant(word), super::side(word)), (leaf, Side::ALL[side]));
         }
 
         #[test]

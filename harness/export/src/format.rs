@@ -83,7 +83,7 @@ fn made(kind: &str, (name, write): (&str, Write), export: &Export, path: &Path) 
     let place = Staging::beside(path).map_err(failed)?;
     let (source, file) = (place.path().join(name), place.path().join("made"));
     let written = write(export, &source)?;
-    (export.options.script)(kind, &source, &file)?;
+    (export.script)(kind, &source, &file)?;
     let mut made = File::open(&file).map_err(failed)?;
     let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
     Ok(Summary { bytes: fill_atomically(path, copy)?, ..written })

@@ -7,7 +7,7 @@
 use std::io::BufWriter;
 use std::path::Path;
 
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 use contract::files;
 use contract::lattice::Root;
 use contract::tree::{Builder, Handle, Kind, Tree};
@@ -22,11 +22,11 @@ use crate::options::{Export, Summary};
 /// # Errors
 /// If the sides of the mesh are unknown, no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
-    let Export { mesh, options, .. } = export;
+    let Export { mesh, selection, .. } = export;
     mesh.require_sides()?;
     let leaves = export.count()?;
     let mut builder = Builder::default();
-    export.visit(&mut |leaf| {
+    selection.visit(mesh, &mut |leaf| {
         builder.push_leaf(word::key_of(leaf.octant.corner), leaf.octant.level, leaf.side as Kind);
         Ok(())
     })?;
@@ -43,7 +43,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let mut out = TreeWriter::new(out, shape.clone()).map_err(named)?;
         let mut deflater = Deflater::default();
         for index in 0..shape.windows() {
-            options.watch.check()?;
+            Progress.check()?;
             let mut window = Window::new(index);
             if index == 0 {
                 window.put_root(siblings(&[tree.root()]));

@@ -10,9 +10,9 @@
 //!
 //! Invariants: words ascend and do not overlap; cells are numbered from 0 in this order, without the leaves that are [`CUT`].
 
-use crate::options::{Export, Options};
+use crate::options::Export;
 use crate::points::Point;
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word;
@@ -20,8 +20,8 @@ use contract::word;
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
 
-/// Visits a cell with its number, its octant and its squares; its error ends the walk.
-pub type Visit<'a> = &'a mut dyn FnMut(u32, &Octant, &[Square]) -> Result<()>;
+/// Visits a cell with its number, its octant and its squares.
+pub type Visit<'a> = &'a mut dyn FnMut(u32, &Octant, &[Square]);
 
 /// The leaves.
 pub struct Leaves {
@@ -60,10 +60,10 @@ impl Leaves {
     /// If the mesh cannot be read, or if the user interrupts.
     pub fn read(export: &Export<'_>, takes: &mut dyn FnMut(&Leaf, bool) -> bool) -> Result<Self> {
         let mut words = Vec::new();
-        export.mesh.leaves(&|| export.options.watch.check(), &|_| true, &mut |leaf| {
+        export.mesh.leaves(&|_| true, &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
-                let word = word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side });
+                let word = word::encode(leaf.octant, leaf.side);
                 words.push(if is_selected { word } else { word | CUT });
             }
             Ok(())
@@ -132,24 +132,18 @@ impl Leaves {
     /// Visits the cells in the order of their numbers, with their octants and squares.
     ///
     /// # Errors
-    /// The first error of `visit`, or the user's interrupt.
-    pub fn walk(&self, options: &Options, visit: Visit) -> Result<()> {
+    /// If the user interrupts.
+    pub fn walk(&self, visit: Visit) -> Result<()> {
         let content = self.content(0, self.words.len(), 0);
         let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
-        self.descend(&root, &mut Vec::new(), options, visit)
+        self.descend(&root, &mut Vec::new(), visit)
     }
 
-    fn descend(
-        &self,
-        around: &Around,
-        squares: &mut Vec<Square>,
-        options: &Options,
-        visit: Visit,
-    ) -> Result<()> {
+    fn descend(&self, around: &Around, squares: &mut Vec<Square>, visit: Visit) -> Result<()> {
         if let Content::Cell(number) = around.content {
-            options.check_at(u64::from(number))?;
+            Progress.check()?;
             self.squares(around, squares);
-            return visit(number, &around.octant, squares);
+            visit(number, &around.octant, squares);
         }
         if !matches!(around.content, Content::Split(..)) {
             return Ok(());
@@ -167,7 +161,7 @@ impl Leaves {
                 content: own[digit],
                 across: std::array::from_fn(|axis| [across(axis, 0), across(axis, 1)]),
             };
-            self.descend(&child, squares, options, visit)?;
+            self.descend(&child, squares, visit)?;
         }
         Ok(())
     }

@@ -10,8 +10,8 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::{Failure, Result, Watch};
-use contract::mesh::{Each, Mesh};
+use contract::failure::{Failure, Result};
+use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word::{self, KEY_END};
 
@@ -23,22 +23,23 @@ pub struct Export<'a> {
     pub mesh: &'a Mesh,
     /// Which of its leaves are exported.
     pub selection: &'a Selection,
-    /// How they are exported.
-    pub options: &'a Options<'a>,
+    /// The case of the mesh: its solids become patches of OpenFOAM.
+    pub case: Option<&'a Case>,
+    /// Width of OpenFOAM's labels.
+    pub label: Label,
+    /// The regions that are exported to OpenFOAM.
+    pub regions: Regions,
+    /// Runs the script that makes a file of this format: its source and the file.
+    pub script: fn(&str, &Path, &Path) -> Result<()>,
 }
 
 impl Export<'_> {
-    /// Visits the selected leaves in Morton order. All leaves are read once.
-    pub(crate) fn visit(&self, visit: Each<'_>) -> Result<()> {
-        self.selection.visit(self.mesh, &|| self.options.watch.check(), visit)
-    }
-
     /// Number of selected leaves, which is not 0.
     pub(crate) fn count(&self) -> Result<u64> {
         let mut leaves = 0;
         match self.is_of_all() {
             true => leaves = self.mesh.leaf_count(),
-            false => self.visit(&mut |_| {
+            false => self.selection.visit(self.mesh, &mut |_| {
                 leaves += 1;
                 Ok(())
             })?,
@@ -56,20 +57,6 @@ impl Export<'_> {
     pub(crate) fn is_of_all(&self) -> bool {
         *self.selection == Selection::default()
     }
-}
-
-/// Options of every export.
-pub struct Options<'a> {
-    /// Whoever waits for the export.
-    pub watch: &'a dyn Watch,
-    /// The case of the mesh: its solids become patches of OpenFOAM.
-    pub case: Option<&'a Case>,
-    /// Width of OpenFOAM's labels.
-    pub label: Label,
-    /// The regions that are exported to OpenFOAM.
-    pub regions: Regions,
-    /// Runs the script that makes a file of this format: its source and the file.
-    pub script: fn(&str, &Path, &Path) -> Result<()>,
 }
 
 /// Width of the numbers of cells, faces and points.
@@ -92,16 +79,6 @@ pub enum Regions {
     All,
     /// They are left out: most solvers accept only one region
     Largest,
-}
-
-impl Options<'_> {
-    /// Whether to continue in a loop of fast steps, of which `count` are done. Most calls do not ask.
-    ///
-    /// # Errors
-    /// If the user has interrupted the export.
-    pub fn check_at(&self, count: u64) -> Result<()> {
-        if count.is_multiple_of(1 << 14) { self.watch.check() } else { Ok(()) }
-    }
 }
 
 /// Refuses to replace a file, or a directory with something in it: what exists may be the only copy of a body, or the case of a solver.

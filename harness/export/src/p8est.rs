@@ -74,7 +74,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
 fn quadrants(export: &Export<'_>, visit: &mut impl FnMut(Octant, u8) -> Result<()>) -> Result<()> {
     let has_sides = export.mesh.manifest.sides == Sides::Known;
     let mut next = 0;
-    export.visit(&mut |Leaf { octant, side, .. }| {
+    export.selection.visit(export.mesh, &mut |Leaf { octant, side, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(Failure::input(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
@@ -134,7 +134,7 @@ fn pad(bytes: &mut Vec<u8>) {
 mod tests {
     use super::*;
     use crate::selection::Selection;
-    use crate::testing::{options, stored};
+    use crate::testing::{export, stored};
     use contract::import::p4est::read;
     use contract::import::{Request, leaf_set};
     use contract::leafset::LeafSet;
@@ -161,7 +161,7 @@ mod tests {
     fn exported(mesh: &Mesh, selection: &Selection) -> (tempfile::TempDir, Summary) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
-        let summary = write(&Export { mesh, selection, options: &options() }, &path).unwrap();
+        let summary = write(&export(mesh, selection), &path).unwrap();
         assert_eq!(fs::metadata(path).unwrap().len(), summary.bytes);
         (dir, summary)
     }
@@ -278,7 +278,7 @@ mod tests {
         let path = dir.path().join("forest.p8est");
         let refusal = |selection: &Selection| {
             let mesh = &mesh_of(vec![deep.clone()]);
-            write(&Export { mesh, selection, options: &options() }, &path)
+            write(&export(mesh, selection), &path)
         };
         let error = refusal(&Selection::default()).unwrap_err().to_string();
         assert!(error.contains("p4est has levels 0 to 18"), "{error}");

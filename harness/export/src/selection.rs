@@ -2,7 +2,7 @@
 
 use contract::failure::Result;
 use contract::lattice::{Root, UNITS_PER_EDGE};
-use contract::mesh::{Check, Each, Leaf, Mesh};
+use contract::mesh::{Each, Leaf, Mesh};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word::Side;
 
@@ -72,9 +72,9 @@ impl Selection {
     ///
     /// # Errors
     /// As [`Mesh::leaves`].
-    pub fn visit(&self, mesh: &Mesh, check: Check<'_>, visit: Each<'_>) -> Result<()> {
+    pub fn visit(&self, mesh: &Mesh, visit: Each<'_>) -> Result<()> {
         let mut selected = |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) };
-        mesh.leaves(check, &|octant| self.meets(octant), &mut selected)
+        mesh.leaves(&|octant| self.meets(octant), &mut selected)
     }
 }
 
@@ -88,8 +88,8 @@ mod tests {
 
     fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>> {
         let mut words = Vec::new();
-        selection.visit(mesh, &|| Ok(()), &mut |leaf| {
-            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
+        selection.visit(mesh, &mut |leaf| {
+            words.push(word::encode(leaf.octant, leaf.side));
             Ok(())
         })?;
         Ok(words)
@@ -113,11 +113,11 @@ mod tests {
             let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
             let mut expected = Vec::new();
             let mut index = 0;
-            mesh.leaves(&|| Ok(()), &|_| true, &mut |leaf| {
+            mesh.leaves(&|_| true, &mut |leaf| {
                 assert_eq!(leaf.index, index);
                 index += 1;
                 expected.extend(selection.has(&leaf).then(|| {
-                    word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
+                    word::encode(leaf.octant, leaf.side)
                 }));
                 Ok(())
             }).unwrap();
@@ -131,8 +131,7 @@ mod tests {
         let mut swapped = leaves.clone();
         swapped.swap(2, 3);
         let mut overlapping = leaves.clone();
-        overlapping
-            .insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
+        overlapping.insert(0, word::encode(Octant::ROOT, Side::Inside));
         let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
         for (leaves, expected) in [
             (swapped, "precedes the leaf before"),

@@ -1,8 +1,8 @@
 //! Meshes on disk, for tests.
 
-use crate::options::{Export, Label, Options, Regions};
+use crate::options::{Export, Label, Regions};
 use crate::selection::Selection;
-use contract::failure::{Result, Watch};
+use contract::failure::Result;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
@@ -13,32 +13,22 @@ use tempfile::TempDir;
 /// The unit cube.
 const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 
-/// Nobody waits.
-struct Unwatched;
-
-impl Watch for Unwatched {
-    fn is_interrupted(&self) -> bool {
-        false
-    }
-}
-
 /// A script that is not expected.
 fn no_script(_: &str, _: &Path, _: &Path) -> Result<()> {
     unreachable!("no other format asks for it")
 }
 
-/// The default options.
-pub fn options<'a>() -> Options<'a> {
+/// An export of the selected leaves of a mesh.
+pub fn export<'a>(mesh: &'a Mesh, selection: &'a Selection) -> Export<'a> {
     let (label, regions) = (Label::default(), Regions::default());
-    let (watch, script) = (&Unwatched, no_script);
-    Options { watch, case: None, label, regions, script }
+    Export { mesh, selection, case: None, label, regions, script: no_script }
 }
 
 /// An export of all leaves of a mesh.
-pub fn whole<'a>(mesh: &'a Mesh, options: &'a Options<'a>) -> Export<'a> {
+pub fn whole(mesh: &Mesh) -> Export<'_> {
     const ALL: &Selection =
         &Selection { clip: None, level_max: None, side: None, rank: None, slice: None };
-    Export { mesh, selection: ALL, options }
+    export(mesh, ALL)
 }
 
 /// A mesh of these parts in a directory, which lasts as long as the first value.

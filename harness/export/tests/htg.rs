@@ -2,7 +2,7 @@
 //! any content is read or refused, without a panic.
 #![allow(missing_docs)]
 
-use contract::failure::{EXIT_INPUT, Failure, Watch};
+use contract::failure::{EXIT_INPUT, Failure};
 use contract::htg::{TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
@@ -10,8 +10,8 @@ use contract::manifest::{Manifest, Tree};
 use contract::mesh::Leaf;
 use contract::mesh::Mesh;
 use contract::testing::random_words;
-use contract::word::{self, Leaf as WordLeaf};
-use export::options::{Export, Label, Options, Regions};
+use contract::word;
+use export::options::{Export, Label, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
@@ -21,14 +21,6 @@ use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window};
 use vtkhdf::write::Deflater;
 
 const ROOT: Root = Root { origin: [0.1, -1.0, 1e6], edge: 0.3 };
-
-struct Quiet;
-
-impl Watch for Quiet {
-    fn is_interrupted(&self) -> bool {
-        false
-    }
-}
 
 /// A mesh of these parts on disk.
 fn on_disk(parts: Vec<Vec<u64>>) -> (TempDir, Mesh) {
@@ -46,8 +38,8 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let path = dir.path().join("mesh.vtkhdf");
     let script = |_: &str, _: &Path, _: &Path| unreachable!("no script makes this format");
     let (label, regions) = (Label::Bits32, Regions::All);
-    let options = Options { watch: &Quiet, case: None, label, regions, script };
-    match export::htg::write(&Export { mesh, selection, options: &options }, &path) {
+    let export = Export { mesh, selection, case: None, label, regions, script };
+    match export::htg::write(&export, &path) {
         Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),
     }
@@ -65,8 +57,8 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
 fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
     let mut leaves = Vec::new();
     selection
-        .visit(mesh, &|| Ok(()), &mut |Leaf { octant, side, index, .. }| {
-            leaves.push((word::encode(&WordLeaf { octant, side }), index));
+        .visit(mesh, &mut |Leaf { octant, side, index, .. }| {
+            leaves.push((word::encode(octant, side), index));
             Ok(())
         })
         .unwrap();

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
-use contract::files;
 use contract::lattice::Root;
 use contract::manifest::ExtentBox;
 use contract::stl::{self, Body};
@@ -52,22 +51,16 @@ impl Input {
     /// If a file cannot be read or the geometry cannot be meshed.
     pub fn read(path: &Path, requested: Requested) -> Result<Self> {
         let wrong = |why: String| Failure::about(path, why);
-        let (table, Body { facets, solids }) = if path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-        {
-            let Case { facets, solids, .. } = Case::read(path)?;
-            let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
-            let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;
-            table.retain(|key, _| match key {
-                "root" | "root_scale" => requested.root.is_none() && requested.root_scale.is_none(),
-                // A seed may lie beyond another root.
-                _ => !["geometry", "generator", "seeds"].contains(&key),
-            });
-            (table, Body { facets, solids })
-        } else {
-            (Table::new(), stl::read(path)?)
+        let is_case = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        let (mut table, Body { facets, solids }) = match is_case {
+            true => {
+                let Case { table, facets, solids, .. } = Case::read(path)?;
+                (table, Body { facets, solids })
+            }
+            false => (Table::new(), stl::read(path)?),
         };
+        // A seed may lie beyond another root.
+        table.retain(|key, _| key != "seeds" && (key != "root" || requested.root_scale.is_none()));
         let mut input = Self::of(table, facets, requested).map_err(wrong)?;
         input.case.solids = solids;
         Ok(input)

@@ -2,7 +2,6 @@
 //!
 //! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
 //! - [`import`]: reads meshes in the formats of other programs, most of them in Python;
-//! - [`progress`]: a line of progress;
 //! - [`python`]: the scripts in Python, among them the oracles trimesh, open3d and pyvista;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
@@ -21,7 +20,6 @@ pub mod engine {
     pub mod templates;
 }
 pub mod import;
-pub mod progress;
 pub mod python;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -14,7 +14,6 @@ use crate::read_toml;
 use contract::case::Case;
 use contract::failure::{Failure, Result};
 use contract::lattice::Root;
-use contract::plain::PlainCase;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -46,7 +45,6 @@ impl Base {
     /// If the case is invalid, it has no generator for other facets, or the directory cannot be written.
     pub fn read(path: &Path, per_rank: Option<[usize; 2]>, place: &Path) -> Result<Self> {
         let mut case = Case::read(path)?;
-        let mut table = PlainCase::read(path)?.table;
         let (mut name, mut stem) = (case.name.clone(), case.name.clone());
         if let Some([facets, ranks]) = per_rank {
             let all = facets * ranks;
@@ -60,8 +58,9 @@ impl Base {
             generator.insert("facets".into(), (all as i64).into());
             let path = place.join(format!("{stem}.toml"));
             fs::write(&path, of_file.to_string()).map_err(|error| Failure::at(&path, error))?;
-            (case, table) = (Case::read(&path)?, PlainCase::read(&path)?.table);
+            case = Case::read(&path)?;
         }
+        let mut table = case.table.clone();
         let [rules, stl] = ["rules", "stl"].map(|kind| place.join(format!("{stem}.{kind}")));
         fs::write(&rules, table.to_string()).map_err(|error| Failure::at(&rules, error))?;
         File::create(&stl)

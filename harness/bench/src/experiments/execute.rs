@@ -173,7 +173,7 @@ mod tests {
     use crate::experiments::entry::{Entry, Machine, Session};
     use crate::testing::{line, run};
     use contract::octant::Octant;
-    use contract::word::{self, Leaf, Side};
+    use contract::word::{self, Side};
     use run::engine::paths::Paths;
     use run::engine::runner::Given;
 
@@ -221,8 +221,8 @@ mod tests {
                     [generator]\nshape = 'cube'\nfacets = 12\n";
         std::fs::write(place.path().join("case.toml"), case).unwrap();
         // The root without its first octant has a hole.
-        let octant = |digit| Leaf { octant: Octant::ROOT.child(digit), side: Side::Outside };
-        let words: Vec<u64> = (1..8).map(|digit| word::encode(&octant(digit))).collect();
+        let leaf = |digit| word::encode(Octant::ROOT.child(digit), Side::Outside);
+        let words: Vec<u64> = (1..8).map(leaf).collect();
         contract::npy::write(&place.path().join("leaves.npy"), &words).unwrap();
         let script = "mkdir -p $2 && cp ${0%/*}/leaves.npy $2/leaves-00000.npy";
         let run = |promise: &str, warm_up| {

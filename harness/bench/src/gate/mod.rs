@@ -40,7 +40,7 @@ pub struct GateOptions {
     #[arg(long, value_name = "REVISION|FILE")]
     pub baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
-    #[arg(long, value_name = "REVISION|FILE")]
+    #[arg(long, value_name = "REVISION|FILE", conflicts_with = "mesher")]
     pub candidate: Option<String>,
     /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
     #[arg(long, value_name = "FILE")]

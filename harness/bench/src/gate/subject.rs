@@ -65,8 +65,6 @@ impl Subject {
         let is_built = baseline.is_some_and(|subject| subject.measured.is_built());
         let own = engine.program.to_string_lossy();
         let default = if is_built && !engine.is_given { WORKING_TREE } else { &own };
-        let is_one = options.candidate.is_none() || !engine.is_given;
-        Failure::unless(is_one, "--candidate and --mesher name two candidates: give one of them")?;
         let named = options.candidate.as_deref().unwrap_or(default);
         if named == own {
             engine.require()?;

@@ -44,7 +44,8 @@ mod tests {
     fn as_a_promise_of_its_own_a_leaf_finer_than_the_surface_inherits_its_side() {
         let check = |subject: Subject| {
             let crossing = crate::promises::Promises { crossing: true, ..Default::default() };
-            super::super::only(&subject.promising(&crossing), &["crossing"]).remove(0)
+            let results = super::super::all(&subject.promising(&crossing));
+            results.into_iter().find(|result| result.name == CHECK.name).unwrap()
         };
         let text =
             "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";

@@ -6,7 +6,7 @@
 
 use super::{Check, CheckResult};
 use contract::lattice::Root;
-use contract::word::{self, Leaf};
+use contract::word;
 use std::fmt;
 
 /// Name of the check.
@@ -47,8 +47,8 @@ pub(crate) struct Named(pub Option<u64>, pub Root);
 impl fmt::Display for Named {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(word) = self.0 else { return f.write_str("no more leaves") };
-        match word::decode(word) {
-            Ok(Leaf { octant, side }) => write!(f, "{side} leaf: {}", self.1.place(octant)),
+        match word::check(word) {
+            Ok(()) => write!(f, "{} leaf: {}", word::side(word), self.1.place(word::octant(word))),
             Err(why) => write!(f, "the word {word:#018x}: {why}"),
         }
     }
@@ -63,12 +63,7 @@ mod tests {
     #[test]
     fn the_first_difference_names_both_leaves_and_all_differences_are_counted() {
         let fine: Vec<u64> = (0..8)
-            .map(|d| {
-                word::encode(&Leaf {
-                    octant: contract::octant::Octant::ROOT.child(d),
-                    side: word::Side::Outside,
-                })
-            })
+            .map(|d| word::encode(contract::octant::Octant::ROOT.child(d), word::Side::Outside))
             .collect();
         let mut coarse = fine.clone();
         coarse[3] |= 1;

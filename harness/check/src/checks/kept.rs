@@ -17,7 +17,7 @@ use contract::lattice::cell_at;
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides, Tree as Kind};
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 
 pub(super) const CHECK: Check =
     Check { name: "kept", wanted: |subject| subject.promises.definition, run };
@@ -80,20 +80,25 @@ fn check_alone(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut 
         let counts = [(Side::Outside, outside), (Side::Inside, counted.inside)];
         counts.into_iter().filter(|(side, _)| is_base || terms.keeps(*side as u8))
     });
-    let Some(octants) = uniform_octants(tree) else {
-        let is_there = |side| tree.kinds(tree.root()) & 1 << side as u8 != 0;
-        for (side, expected) in counts.into_iter().flatten() {
-            if (expected > 0) != is_there(side) {
-                result.report(format_args!(
-                    "the manifest leaves {expected} {side} components, which its leaves contradict"
-                ));
-            }
+    let octants = uniform_octants(tree);
+    let found = octants.as_ref().map(|octants| components::stated(octants, terms));
+    for (side, expected) in counts.into_iter().flatten() {
+        let (least, found) = match &found {
+            Some(all) => (expected, all.iter().filter(|of| of.side == side).count() as u64),
+            // Leaves show whether there is one.
+            None => (expected.min(1), (tree.kinds(tree.root()) >> side as u8 & 1).into()),
+        };
+        if found != least {
+            result.report(format_args!(
+                "the manifest leaves {expected} {side} components, and there are {found}"
+            ));
         }
+    }
+    let (Some(octants), Some(found)) = (octants, found) else {
         let why = format!("over {OCTANTS_MAX} octants have leaves of one side");
         result.note = format!("components are not known: {why}");
         return;
     };
-    let found = components::stated(&octants, terms);
     let place = |component: &Component| terms.root.place(component.first);
     let enclosed = || found.iter().filter(|component| component.enclosed);
     if manifest.tree == Kind::Final {
@@ -115,14 +120,6 @@ fn check_alone(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut 
         }
     }
     let Some(counted) = &manifest.components else { return };
-    for (side, expected) in counts.into_iter().flatten() {
-        let found = found.iter().filter(|component| component.side == side).count() as u64;
-        if found != expected {
-            result.report(format_args!(
-                "the manifest leaves {expected} {side} components, and there are {found}"
-            ));
-        }
-    }
     let (found, count) = (enclosed().count() as u64, counted.enclosed.count);
     if is_base && found != count {
         result.report(format_args!(
@@ -141,7 +138,7 @@ fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
     tree.walk(&mut |octant, handle| {
         let kinds = tree.kinds(handle);
         let one = [Side::Outside, Side::Inside].into_iter().find(|&s| kinds == 1 << s as u8);
-        words.extend(one.map(|side| word::encode(&Leaf { octant, side })));
+        words.extend(one.map(|side| word::encode(octant, side)));
         one.is_none() && words.len() <= OCTANTS_MAX
     });
     (words.len() <= OCTANTS_MAX).then_some(words)

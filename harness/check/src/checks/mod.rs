@@ -69,22 +69,13 @@ pub const CHECKS: [Check; 13] = [
 
 /// Runs all checks that the subject must pass.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
-    run(subject, |check| (check.wanted)(subject))
-}
-
-/// Runs the checks with these names.
-pub fn only(subject: &Subject, names: &[&str]) -> Vec<CheckResult> {
-    run(subject, |check| names.contains(&check.name))
-}
-
-fn run(subject: &Subject, choose: impl Fn(&Check) -> bool) -> Vec<CheckResult> {
     let is_of_files =
         |check: &Check| [manifest::CHECK.name, pass::CHECK.name].contains(&check.name);
-    let chosen = CHECKS.iter().filter(|check| choose(check));
+    let wanted = CHECKS.iter().filter(|check| (check.wanted)(subject));
     // Counts and digests need no tree.
     let capacity = subject.capacity();
     let is_possible = capacity.as_ref().is_none_or(CheckResult::holds);
-    let possible = chosen.filter(|check| is_possible || is_of_files(check));
+    let possible = wanted.filter(|check| is_possible || is_of_files(check));
     possible.map(|check| check.result(subject)).chain(capacity.clone()).collect()
 }
 

@@ -13,7 +13,7 @@ use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, Handle, Kind, Kinds, Tree};
 use contract::triangle::Triangle;
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 
 /// The kind, in T0's tree, of an outside leaf that is deleted because its component is enclosed.
 const ENCLOSED: Kind = 3;
@@ -55,7 +55,7 @@ impl Truth {
             let splits = by_surface || terms.box_that_splits(&octant).is_some();
             if !splits {
                 let side = if near.is_empty() { Side::Outside } else { Side::Crossing };
-                words.push(word::encode(&Leaf { octant, side }));
+                words.push(word::encode(octant, side));
             }
             splits && words.len() <= Self::LEAVES_MAX
         });

@@ -7,22 +7,22 @@ use crate::why::Mesh;
 use crate::why::answer::{Answer, LOST};
 use contract::octant::Octant;
 use contract::tree::Kind;
-use contract::word::{self, Leaf};
+use contract::word::{self, Side};
 
 /// A mesh with its name.
 type Named<'a> = (&'static str, &'a Mesh<'a>);
 
 /// The rule at the first difference of two meshes of the same inputs.
 pub(super) fn at(a: &Mesh, b: &Mesh, x: Option<u64>, y: Option<u64>) -> String {
-    let leaf = |word: u64| word::decode(word).expect("the words that are compared are leaves");
     let (a, b) = (("A", a), ("B", b));
-    match (x.map(leaf), y.map(leaf)) {
-        (Some(x), Some(y)) if x.octant == y.octant => side(&x, &y, a.1),
-        (Some(x), Some(y)) if x.octant.contains(&y.octant) => split(&x.octant, a, b),
-        (Some(x), Some(y)) if y.octant.contains(&x.octant) => split(&y.octant, b, a),
-        (Some(x), Some(y)) if word::encode(&x) > word::encode(&y) => absence(&y, b.0, a),
-        (Some(x), _) => absence(&x, a.0, b),
-        (None, Some(y)) => absence(&y, b.0, a),
+    let of = word::octant;
+    match (x, y) {
+        (Some(x), Some(y)) if of(x) == of(y) => side(&of(x), [x, y].map(word::side), a.1),
+        (Some(x), Some(y)) if of(x).contains(&of(y)) => split(&of(x), a, b),
+        (Some(x), Some(y)) if of(y).contains(&of(x)) => split(&of(y), b, a),
+        (Some(x), Some(y)) if x > y => absence(y, b.0, a),
+        (Some(x), _) => absence(x, a.0, b),
+        (None, Some(y)) => absence(y, b.0, a),
         (None, None) => "none: the leaves are the same".to_owned(),
     }
 }
@@ -34,27 +34,27 @@ fn of_centre(mesh: &Mesh, octant: &Octant) -> Answer {
 }
 
 /// The rule for an octant that has different sides.
-fn side(x: &Leaf, y: &Leaf, mesh: &Mesh) -> String {
-    let Some((side, decision)) = of_centre(mesh, &x.octant).side_decided_by else {
+fn side(octant: &Octant, [x, y]: [Side; 2], mesh: &Mesh) -> String {
+    let Some((side, decision)) = of_centre(mesh, octant).side_decided_by else {
         return "section 4 (side): give the case file (--case) to decide it".to_owned();
     };
-    let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
+    let right = [(x, "A"), (y, "B")].into_iter().find(|(of, _)| *of == side);
     let right = right.map_or("neither", |(_, name)| name);
     format!("section 4 ({decision}): it is {side}, and {right} is right")
 }
 
 /// The rule for a leaf that the other mesh does not have in any form.
-fn absence(leaf: &Leaf, has: &str, (lacks, mesh): Named) -> String {
-    if let Some(rule) = of_centre(mesh, &leaf.octant).deleted_by {
+fn absence(leaf: u64, has: &str, (lacks, mesh): Named) -> String {
+    if let Some(rule) = of_centre(mesh, &word::octant(leaf)).deleted_by {
         let right = if rule.ends_with(LOST) { has } else { lacks };
         return format!("{rule}: {right} is right");
     }
-    let is_kept = mesh.inputs.keeps(leaf.side as Kind);
+    let side = word::side(leaf);
+    let is_kept = mesh.inputs.keeps(side as Kind);
     let (what, right) = if is_kept { ("kept", has) } else { ("deleted", lacks) };
     format!(
-        "sections 5 and 7: a leaf that is {} is {what}, so {right} is right, unless its component has another side or is \
-         enclosed (give the case file: --case)",
-        leaf.side
+        "sections 5 and 7: a leaf that is {side} is {what}, so {right} is right, unless its component has another side or is \
+         enclosed (give the case file: --case)"
     )
 }
 
@@ -81,7 +81,6 @@ mod tests {
     use contract::case::Case;
     use contract::manifest;
     use contract::tree::Tree;
-    use contract::word::Side;
 
     const ROOT: &str = "root = { origin = [-4.0, -4.0, -4.0], edge = 8.0 }";
     /// In octant 0.7.0, which has the level of the surface.
@@ -97,7 +96,7 @@ mod tests {
 
     /// The word of an outside leaf.
     fn leaf(path: &[u8]) -> u64 {
-        word::encode(&Leaf { octant: octant(path), side: Side::Outside })
+        word::encode(octant(path), Side::Outside)
     }
 
     /// The rule at the first difference of two meshes, whose case is given with `--case` or not.
@@ -117,7 +116,7 @@ mod tests {
         for path in paths {
             let i = words.iter().position(|&w| word::octant(w) == octant(path)).expect("a leaf");
             let side = word::side(words[i]);
-            let child = |digit| word::encode(&Leaf { octant: octant(path).child(digit), side });
+            let child = |digit| word::encode(octant(path).child(digit), side);
             words.splice(i..=i, (0..8).map(child));
         }
         words

@@ -76,7 +76,6 @@ pub fn is_doubled(facets: &[FacetLattice]) -> bool {
 mod tests {
     use super::*;
     use contract::octant::Octant;
-    use contract::word::Leaf;
 
     const BODY: [[f32; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
@@ -89,8 +88,8 @@ mod tests {
     /// The 512 octants of level 3, each side in turn.
     fn leaves() -> Vec<u64> {
         let octant = |key: u64| Octant { corner: word::corner_of(key << 48), level: 3 };
-        let leaf = |key: u64| Leaf { octant: octant(key), side: Side::ALL[(key % 3) as usize] };
-        (0..512).map(|key| word::encode(&leaf(key))).collect()
+        let leaf = |key: u64| word::encode(octant(key), Side::ALL[(key % 3) as usize]);
+        (0..512).map(leaf).collect()
     }
 
     #[test]

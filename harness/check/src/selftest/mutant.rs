@@ -8,7 +8,7 @@ use super::SelftestCase;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree as Kind};
 use contract::octant::CELLS_PER_EDGE;
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 
 /// A way to corrupt a correct mesh.
 #[derive(Clone, Copy, Debug)]
@@ -150,7 +150,7 @@ pub(super) fn other_side(word: u64) -> u64 {
 /// The eight children of a leaf, with its side.
 pub(super) fn children(word: u64) -> [u64; 8] {
     let (octant, side) = (word::octant(word), word::side(word));
-    std::array::from_fn(|d| word::encode(&Leaf { octant: octant.child(d as u8), side }))
+    std::array::from_fn(|d| word::encode(octant.child(d as u8), side))
 }
 
 /// The words with the first leaf split that satisfies a predicate.
@@ -170,7 +170,7 @@ pub(super) fn sibling_groups(words: &[u64]) -> Vec<usize> {
 /// The parent of a leaf, with the leaf's side.
 pub(super) fn parent(word: u64) -> u64 {
     let octant = word::octant(word);
-    word::encode(&Leaf { octant: octant.parent(), side: word::side(word) })
+    word::encode(octant.parent(), word::side(word))
 }
 
 /// The words with the groups of eight siblings at these ascending indices merged.
@@ -198,7 +198,7 @@ pub(super) fn mirrored(words: &[u64]) -> Vec<u64> {
     let mirror = |&w: &u64| {
         let mut octant = word::octant(w);
         octant.corner[0] = CELLS_PER_EDGE - octant.edge() - octant.corner[0];
-        word::encode(&Leaf { octant, side: word::side(w) })
+        word::encode(octant, word::side(w))
     };
     let mut all: Vec<u64> = words.iter().map(mirror).collect();
     all.sort_unstable();

@@ -13,7 +13,7 @@ pub use super::gradation::Rule;
 use crate::checks::components::{Component, Decision};
 use contract::lattice::{Root, UNITS_PER_EDGE, cell_at};
 use contract::octant::{LEVEL_MAX, Octant};
-use contract::word::{Leaf, Side};
+use contract::word::Side;
 use std::fmt;
 
 /// Facets that are listed; further ones are counted only.
@@ -24,8 +24,8 @@ const FACETS_LISTED: usize = 8;
 pub struct Answer {
     /// The point, in the user's units.
     pub point: [f64; 3],
-    /// The leaf at the point; none if the point lies in a deleted part.
-    pub leaf: Option<Leaf>,
+    /// The leaf at the point, and its side; none if the point lies in a deleted part.
+    pub leaf: Option<(Octant, Side)>,
     /// The leaf of T0 at the point; none if the surface is not known.
     pub base_leaf: Option<Octant>,
     /// The side, and what decides it (section 4), in words; none if the facets are not known.
@@ -71,7 +71,7 @@ impl Answer {
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
         let Self { point, leaf, base_leaf, deleted_by, split, root, .. } = self;
-        let leaf = leaf.map(|leaf| leaf.octant);
+        let leaf = leaf.map(|(octant, _)| octant);
         for octant in leaf.iter().chain(base_leaf) {
             let cell = root.quantise(*point).and_then(cell_at);
             let holds = |corner| octant.contains(&Octant { corner, level: LEVEL_MAX });
@@ -161,11 +161,11 @@ impl fmt::Display for Answer {
         let place = |octant: &Octant| self.root.place(*octant);
         let Self { point, leaf, base_leaf, side_decided_by, deleted_by, split, .. } = self;
         let lies_in = match leaf {
-            Some(leaf) => format!("the {} leaf {}", leaf.side, place(&leaf.octant)),
+            Some((leaf, side)) => format!("the {side} leaf {}", place(leaf)),
             None => "a part of the root that was deleted".to_owned(),
         };
         writeln!(f, "{point:?} lies in {lies_in}")?;
-        if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|leaf| leaf.octant != *base)) {
+        if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|(leaf, _)| leaf != *base)) {
             writeln!(f, "  leaf of T0: {}", place(&base))?;
         }
         deleted_by.iter().try_for_each(|rule| writeln!(f, "  deleted by {rule}"))?;
@@ -200,10 +200,10 @@ impl Mesh<'_> {
             format!("the point {point:?} lies outside the root, which is from {from:?} up to, and without, {to:?}; give a point inside")
         })?;
         let leaf = self.tree.locate(corner);
-        let leaf = leaf.map(|(octant, kind)| Leaf { octant, side: Side::ALL[usize::from(kind)] });
+        let leaf = leaf.map(|(octant, kind)| (octant, Side::ALL[usize::from(kind)]));
         let cell = Octant { corner, level: LEVEL_MAX };
         let base_leaf = self.knows_surface().then(|| self.base_leaf(&cell).expect("never split"));
-        let octant = leaf.map(|leaf| leaf.octant).or(base_leaf).filter(|octant| octant.level > 0);
+        let octant = leaf.map(|(octant, _)| octant).or(base_leaf).filter(|octant| octant.level > 0);
         let (side_decided_by, deletion) = base_leaf.and_then(|base| self.side_of(&base)).unzip();
         let answer = Answer {
             point,

@@ -7,7 +7,7 @@ use check::promises::{Promises, Sides, Surface, Touching};
 use contract::leafset::LeafSet;
 use contract::manifest::Tree;
 use contract::octant::Octant;
-use contract::word::{self, Leaf, Side};
+use contract::word::{self, Side};
 use geometries::Facet;
 use proptest::prelude::*;
 
@@ -149,7 +149,7 @@ fn a_layer_that_is_too_thin_around_deleted_leaves_breaks_its_promise() {
     let (inside, mut merged): (Vec<u64>, Vec<u64>) =
         words.iter().partition(|w| parent.contains(&word::octant(**w)));
     assert_eq!(inside.len(), 8);
-    merged.push(word::encode(&Leaf { octant: parent, side: Side::Outside }));
+    merged.push(word::encode(parent, Side::Outside));
     merged.sort_unstable();
     assert!(!holds(&correct.mesh.with_parts(vec![merged])));
 }

@@ -147,7 +147,7 @@ fn an_answer_that_contradicts_itself_is_a_bug() {
         &|a| a.leaf = None,
         &|a| a.base_leaf = Some(chain(a).links[0].1),
         &|a| a.split = None,
-        &|a| chain(a).links[0].1 = a.leaf.unwrap().octant,
+        &|a| chain(a).links[0].1 = a.leaf.unwrap().0,
         &|a| chain(a).links.swap(0, 1),
         &|a| _ = chain(a).links.pop(),
         &|a| chain(a).cause = None,

@@ -4,7 +4,7 @@ use super::*;
 use check::why::NEEDLESS;
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::testing::octants_of;
-use contract::word::{self, Leaf};
+use contract::word;
 
 /// The octants with each fault, and how many were examined.
 #[derive(Debug, Default)]
@@ -31,8 +31,8 @@ fn audited(set: &LeafSet, case: Option<&Case>) -> Found {
 
 /// The words with the leaf at an index split.
 fn split(words: &mut Vec<u64>, at: usize) {
-    let Leaf { octant, side } = word::decode(words[at]).unwrap();
-    let children = (0..8).map(|d| word::encode(&Leaf { octant: octant.child(d), side }));
+    let (octant, side) = (word::octant(words[at]), word::side(words[at]));
+    let children = (0..8).map(|d| word::encode(octant.child(d), side));
     words.splice(at..=at, children);
 }
 
@@ -94,8 +94,8 @@ proptest! {
             }
             let at = groups[which.index(groups.len())];
             let octant = parent(&words[at]).expect("it has siblings");
-            let side = word::decode(words[at]).unwrap().side;
-            words.splice(at..at + 8, [word::encode(&Leaf { octant, side })]);
+            let side = word::side(words[at]);
+            words.splice(at..at + 8, [word::encode(octant, side)]);
             let mutated = correct.mesh.with_parts(vec![words]);
             let found = audited(&mutated, Some(&correct.case));
             prop_assert!(found.missing.contains(&octant), "{}{} {:?}", text, octant, found);

@@ -50,7 +50,7 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
     let mut seeds = Vec::new();
     for answer in explain(&correct) {
         let (side, decision) = answer.side_decided_by.unwrap();
-        assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(side));
+        assert_eq!(answer.leaf.map(|(_, side)| side), Some(side));
         if side != Side::Crossing {
             assert_eq!(decision.starts_with("seed "), side == Side::Outside);
             seeds.push(decision);
@@ -78,7 +78,7 @@ fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
             assert!(found.iter().any(|c| begins(&c.first) && c.side == *side), "{answer}");
             let parity = if *side == Side::Inside { "an odd" } else { "an even" };
             assert!(decision.contains(parity), "{answer}");
-            assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(*side));
+            assert_eq!(answer.leaf.map(|(_, side)| side), Some(*side));
             sides.push(*side);
         }
     }
@@ -140,7 +140,7 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
             with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
         let (side, decision) = answer.side_decided_by.unwrap();
         let expected = if twice < 3 { Side::Inside } else { Side::Outside };
-        assert_eq!((side, answer.leaf.unwrap().side), (expected, expected), "{twice}: {decision}");
+        assert_eq!((side, answer.leaf.unwrap().1), (expected, expected), "{twice}: {decision}");
         if (1..6).contains(&twice) {
             let terms = correct.case.rules.clone();
             let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);

@@ -2,12 +2,11 @@
 
 use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure, Result};
+use contract::failure::{EXIT_HOLDS, Failure, Progress, Result};
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS};
-use export::options::{Export, Label, Options, Regions, Summary};
+use export::options::{Export, Label, Regions, Summary};
 use run::engine::paths::Paths;
-use run::progress::Progress;
 use run::python;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -69,15 +68,15 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Failure::unless(!is_part, format!("{}: {why}", file.display()))?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let options = Options {
-        watch: &Progress,
+    let export = Export {
+        mesh: &mesh,
+        selection: &selection,
         case: case.as_ref(),
         label: label.unwrap_or_default(),
         regions: regions.unwrap_or_default(),
         script,
     };
-    let written =
-        (format.write)(&Export { mesh: &mesh, selection: &selection, options: &options }, file);
+    let written = (format.write)(&export, file);
     Progress.finish();
     let Summary { leaves, bytes, notes } = written?;
     let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };

@@ -4,7 +4,7 @@ use crate::options::{Input, Output, examples, point, whole_seconds};
 use crate::output::put_forms;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Result, Watch};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Progress, Result, Watch};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::{PlainCase, StlForm};
@@ -13,7 +13,6 @@ use report::pretty;
 use run::engine::layout::SERIAL;
 use run::engine::paths::Paths;
 use run::engine::runner::Engine;
-use run::progress::Progress;
 use std::cell::Cell;
 use std::fs;
 use std::path::Path;
@@ -52,9 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let path = paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
     let place = tempfile::tempdir()?;
-    let plain = PlainCase::read(&path)?;
     let tree = |level: u8| -> Result<LeafSet> {
-        let mut plain = plain.clone();
+        let mut plain = PlainCase::of(&case);
         if level != case.level_surface {
             // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
             plain.table.remove("seeds");

@@ -4,6 +4,7 @@ use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{fault, shrink, write};
 use clap::Args;
+use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use contract::files::{Staging, nearest_directory};
 use contract::plain::PlainCase;
@@ -70,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let staging = || Staging::inside(nearest_directory(&out)).map_err(named);
     let staging = (!arguments.test_only).then(staging).transpose()?;
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
-    let trial = Trial { case: PlainCase::read(&path)?, ranks };
+    let trial = Trial { case: PlainCase::of(&Case::read(&path)?), ranks };
     let judged = probe.judge(&trial)?;
     let Some(first) = fault(&judged, arguments.check.as_deref())? else {
         println!("the case does not fail {}", arguments.check.as_deref().unwrap_or("any check"));

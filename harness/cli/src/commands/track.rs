@@ -6,6 +6,7 @@ use bench::jsonl;
 use bench::track::history::{self, History, Record};
 use bench::track::{LEVEL_MIN, Series, VALUES_MIN, analyse};
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure, Result};
 use report::pretty;
 use report::track::{COMMIT, junit, page, summary};
@@ -41,20 +42,13 @@ pub struct Arguments {
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again: at least 5,
-    /// and rather 8
-    #[arg(long, value_name = "N", value_parser = recent)]
+    /// Exit code 1 (and a failed test) if a metric became worse within its last N values, and has not become as good again: at least 5, as
+    /// with fewer most steps of a metric with noise are never seen, and rather 8
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(LEVEL_MIN as u64..))]
     fail_recent: Option<usize>,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
     #[arg(long, default_value_t = 0.01, value_parser = number_in(1e-6..=1.0))]
     alpha: f64,
-}
-
-/// Parses a number of last values.
-fn recent(text: &str) -> Result<usize, String> {
-    let number = text.parse().ok().filter(|number| *number >= LEVEL_MIN);
-    let why = "with fewer, most steps of a metric with noise are never seen";
-    number.ok_or_else(|| format!("give at least {LEVEL_MIN}: {why}"))
 }
 
 /// Appends, analyses, prints and writes; returns the exit code.

@@ -346,7 +346,7 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     // Options that would have no effect, and an address that is the same for all commits.
     for few in [1, 4] {
         let refused = fixture.harness(&format!("track history.jsonl --fail-recent {few}"));
-        let why = "give at least 5: with fewer";
+        let why = "is not in 5..";
         assert!(refused.code == 2 && refused.printed.contains(why), "{}", refused.printed);
     }
     for unused in ["--commit HEAD", "--repository .", "--link x/{commit}", "--page p --link x"] {

@@ -10,7 +10,7 @@ use crate::digest::Digest;
 use crate::failure::{Failure, Result};
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
-use crate::word::{self, Leaf, Side};
+use crate::word::{self, Side};
 
 /// The axis-aligned cubes of a file, in its order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,7 +57,7 @@ impl Cells {
                 )
             })?;
             let side = self.sides.as_ref().map_or(Side::Outside, |sides| sides[i]);
-            Ok(word::encode(&Leaf { octant, side }))
+            Ok(word::encode(octant, side))
         };
         let in_order = (0..self.count()).map(word).collect::<Result<Vec<u64>, String>>()?;
         self.agree_with_levels(&in_order)?;

@@ -11,7 +11,6 @@ use contract::word;
 
 use super::Patches;
 use crate::leaves::Leaves;
-use crate::options::Options;
 use crate::points::{Points, Polygons, edges};
 use contract::failure::Result;
 
@@ -33,16 +32,11 @@ impl Faces {
     ///
     /// # Errors
     /// If the user interrupts.
-    pub fn new(
-        leaves: &Leaves,
-        points: &Points,
-        patches: &Patches,
-        options: &Options,
-    ) -> Result<Self> {
+    pub fn new(leaves: &Leaves, points: &Points, patches: &Patches) -> Result<Self> {
         let mut all = Self::default();
         let mut of_patches = vec![Self::default(); patches.names.len()];
         let mut owned = Vec::new();
-        leaves.walk(options, &mut |cell, _, squares| {
+        leaves.walk(&mut |cell, _, squares| {
             owned.clear();
             for (i, square) in squares.iter().enumerate() {
                 match square.across.as_cell() {
@@ -61,7 +55,6 @@ impl Faces {
                 all.owner.push(cell);
                 all.neighbour.push(across);
             }
-            Ok(())
         })?;
         for patch in of_patches {
             all.starts.push(all.count());
@@ -129,15 +122,14 @@ fn sum_of_edges(vertices: &[u32]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{mesh_of, options};
+    use super::super::tests::mesh_of;
     use super::*;
     use contract::testing::words_of;
 
     /// Asserts that a change of the faces of a small mesh is noticed, and for the stated reason.
     fn assert_noticed(why: &str, change: impl Fn(&mut Faces)) {
         let words = words_of(|o| o.level == 0 || o.level == 1 && o.corner == [0; 3]);
-        let options = options();
-        let mesh = mesh_of(&words, |_| false, &options);
+        let mesh = mesh_of(&words, |_| false);
         mesh.faces.check_invariants(&mesh.leaves, &mesh.points);
         let mut faces = mesh.faces.clone();
         change(&mut faces);

@@ -10,9 +10,9 @@ use contract::manifest::Sides;
 use contract::word;
 
 use super::Mesh;
-use crate::options::{Export, Label, Options};
+use crate::options::{Export, Label};
 use crate::points::to_user;
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 
 impl Mesh {
     /// Writes the files into a directory.
@@ -20,17 +20,17 @@ impl Mesh {
     /// # Errors
     /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
     pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<()> {
-        let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
+        let (faces, label, manifest) = (&self.faces, export.label, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices = faces.vertices.corners.len() as u64;
-        let fits = options.label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
+        let fits = label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
         let why = "the faces have more vertices than 32 bits can number: select a part, or write a polyMesh with --label 64";
         Failure::unless(fits, why)?;
         let (count, internal) = (faces.count(), faces.neighbour.len());
         let note =
             format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");
         let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
-            let mut file = ListFile::create(dir, options, ["labelList", object, note])?;
+            let mut file = ListFile::create(dir, label, ["labelList", object, note])?;
             file.labels(labels.len() as u64, labels)?;
             file.finish()
         };
@@ -45,14 +45,14 @@ impl Mesh {
             labels("rank", "", &mut ranks.iter().map(|&rank| rank.into()))?;
         }
         let ends = faces.vertices.ends.iter().map(|&end| end as i64);
-        let mut file = ListFile::create(dir, options, ["faceCompactList", "faces", ""])?;
+        let mut file = ListFile::create(dir, label, ["faceCompactList", "faces", ""])?;
         file.labels(count as u64 + 1, std::iter::once(0).chain(ends))?;
         file.labels(vertices, faces.vertices.corners.iter().map(|&point| point.into()))?;
         file.finish()?;
-        let mut file = ListFile::create(dir, options, ["vectorField", "points", ""])?;
+        let mut file = ListFile::create(dir, label, ["vectorField", "points", ""])?;
         file.list(points, self.points.all.iter().map(|at| to_user(at, &manifest.root)))?;
         file.finish()?;
-        self.write_boundary(options.label, dir)
+        self.write_boundary(label, dir)
     }
 
     fn write_boundary(&self, label: Label, dir: &Path) -> Result<()> {
@@ -84,22 +84,22 @@ fn header(format: &str, label: Label, class: &str, object: &str, note: &str) -> 
 }
 
 /// A file with lists.
-struct ListFile<'a> {
+struct ListFile {
     out: BufWriter<File>,
-    options: &'a Options<'a>,
+    label: Label,
 }
 
-impl<'a> ListFile<'a> {
+impl ListFile {
     /// Begins a file.
-    fn create(dir: &Path, options: &'a Options, [class, object, note]: [&str; 3]) -> Result<Self> {
+    fn create(dir: &Path, label: Label, [class, object, note]: [&str; 3]) -> Result<Self> {
         let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
-        out.write_all(header("binary", options.label, class, object, note).as_bytes())?;
-        Ok(Self { out, options })
+        out.write_all(header("binary", label, class, object, note).as_bytes())?;
+        Ok(Self { out, label })
     }
 
     /// Adds a list of `count` labels.
     fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<()> {
-        match self.options.label {
+        match self.label {
             Label::Bits32 => self.list(count, labels.map(|label| label as i32)),
             Label::Bits64 => self.list(count, labels),
         }
@@ -109,8 +109,8 @@ impl<'a> ListFile<'a> {
     fn list<T: NoUninit>(&mut self, n: u64, items: impl Iterator<Item = T>) -> Result<()> {
         let [begin, end] = if n == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{n}\n{begin}")?;
-        for (item, number) in items.zip(0..) {
-            self.options.check_at(number)?;
+        for item in items {
+            Progress.check()?;
             self.out.write_all(bytemuck::bytes_of(&item))?;
         }
         Ok(writeln!(self.out, "{end}")?)

@@ -20,7 +20,7 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 use contract::files::{Staging, nearest_directory};
 use contract::number::numbered;
 use contract::sets::Sets;
@@ -28,7 +28,7 @@ use contract::word;
 use geometry::tree::{FacetTree, Point};
 
 use crate::leaves::{Content, Leaves, Square};
-use crate::options::{Export, Options, Regions, Summary, require_new};
+use crate::options::{Export, Regions, Summary, require_new};
 use crate::points::Points;
 use faces::Faces;
 
@@ -63,12 +63,12 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     for file in fs::read_dir(&dir).map_err(named)? {
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
-    export.options.watch.check()?;
+    Progress.check()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));
         moved.and_then(|()| fs::rename(&dir, path)).map_err(named)
     })?;
-    let mut notes = of_mesh.notes(export.options.regions);
+    let mut notes = of_mesh.notes(export.regions);
     if of_mesh.leaves.cells().any(word::is_crossing) {
         notes.push(CROSSED.to_owned());
     }
@@ -81,8 +81,8 @@ const CROSSED: &str = "warning: the geometry crosses cells of this mesh, and a f
 
 /// The selected leaves as a mesh.
 fn read(export: &Export<'_>) -> Result<Mesh> {
-    let Export { mesh, options, .. } = *export;
-    options.case.iter().try_for_each(|case| mesh.require_case(case))?;
+    let Export { mesh, case, regions, .. } = *export;
+    case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.parts.len() > 1).then(Vec::new);
     let leaves = Leaves::read(export, &mut |leaf, is_selected| {
         if let Some(ranks) = ranks.as_mut().filter(|_| is_selected) {
@@ -91,17 +91,16 @@ fn read(export: &Export<'_>) -> Result<Mesh> {
         true
     })?;
     export.require_some(leaves.count().into())?;
-    Mesh::new(leaves, ranks, Patches::new(options.case, !export.is_of_all()), options)
+    Mesh::new(leaves, ranks, Patches::new(case, !export.is_of_all()), regions)
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then the first.
-fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32)> {
+fn regions(leaves: &Leaves) -> Result<(Vec<u32>, usize, u32)> {
     // Sets of cells, which are represented by their first cells.
     let mut sets = Sets::new(leaves.count() as usize);
-    leaves.walk(options, &mut |cell, _, squares| {
+    leaves.walk(&mut |cell, _, squares| {
         let high = squares.iter().filter(|square| square.is_high);
         high.filter_map(|square| square.across.as_cell()).for_each(|to| sets.union(cell, to));
-        Ok(())
     })?;
     let of_cell: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
     let mut volumes = vec![0; of_cell.len()];
@@ -115,16 +114,15 @@ fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32)>
 
 /// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They are
 /// numbered as the cells need them, so those of a cell are close together.
-fn points(leaves: &Leaves, options: &Options) -> Result<Points> {
+fn points(leaves: &Leaves) -> Result<Points> {
     let mut points = Points::default();
-    leaves.walk(options, &mut |_, octant, squares| {
+    leaves.walk(&mut |_, octant, squares| {
         let (low, edge) = (octant.corner, octant.edge());
         for digit in 0..8 {
             points.add(std::array::from_fn(|a| low[a] + edge * (digit >> a & 1)));
         }
         let of_boundary = squares.iter().filter(|square| square.across.as_cell().is_none());
         of_boundary.flat_map(|square| square.corners(true)).for_each(|at| _ = points.add(at));
-        Ok(())
     })?;
     Ok(points)
 }
@@ -135,10 +133,10 @@ impl Mesh {
         mut leaves: Leaves,
         mut ranks: Option<Vec<u32>>,
         patches: Patches,
-        options: &Options<'_>,
+        exported: Regions,
     ) -> Result<Self> {
-        let (of_cell, regions, largest) = regions(&leaves, options)?;
-        if options.regions == Regions::Largest && regions > 1 {
+        let (of_cell, regions, largest) = regions(&leaves)?;
+        if exported == Regions::Largest && regions > 1 {
             let is_kept = |cell: u32| of_cell[cell as usize] == largest;
             leaves = leaves.retain(is_kept);
             if let Some(ranks) = &mut ranks {
@@ -146,8 +144,8 @@ impl Mesh {
                 ranks.retain(|_| cells.next().is_some_and(is_kept));
             }
         }
-        let points = points(&leaves, options)?;
-        let faces = Faces::new(&leaves, &points, &patches, options)?;
+        let points = points(&leaves)?;
+        let faces = Faces::new(&leaves, &points, &patches)?;
         faces.check_invariants(&leaves, &points);
         Ok(Self { leaves, points, faces, patches, ranks, regions })
     }

@@ -16,20 +16,17 @@
 #[cfg(test)]
 mod tests;
 
+use std::fmt::Display;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result, Watch};
 use contract::files::fill_atomically;
 use contract::lattice::Root;
 use contract::number::number;
 use contract::octant::edge_of;
 use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version,
-    VertexNumbers, Vtk,
-};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Summary, require_new};
@@ -69,11 +66,10 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
     // Without crossing leaves, exposed faces are those at holes.
     let leaves = Leaves::read(export, &mut |leaf, _| leaf.side != Side::Crossing)?;
     let (mut faces, mut words) = (Vec::new(), leaves.cells());
-    leaves.walk(export.options, &mut |_, _, squares| {
+    leaves.walk(&mut |_, _, squares| {
         let leaf = words.next().expect("cells are visited in the order of their words");
         let exposed = squares.iter().filter(|square| square.across == Content::Hole);
         faces.extend(exposed.map(|&square| Face { square, leaf }));
-        Ok(())
     })?;
     Ok(faces)
 }
@@ -84,44 +80,33 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
 /// If the mesh cannot be read or has no such faces, if the file cannot be written, or if the user interrupts.
 pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
     write(export, path, &|Front { root, faces, points, polygons }, out| {
-        let points = points.all.iter().flat_map(|at| to_user(at, root));
         let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
-        let cell = vec![
-            array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
-            array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
-            array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
-        ];
-        let piece = PolyDataPiece {
-            points: points.collect::<Vec<f64>>().into(),
-            polys: Some(VertexNumbers::XML {
-                connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
-                offsets: polygons.ends.clone(),
-            }),
-            data: Attributes { point: Vec::new(), cell },
-            ..PolyDataPiece::default()
-        };
-        Ok(write_xml(piece, out)?)
+        let (n, m) = (points.all.len(), faces.len());
+        let head = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\">";
+        writeln!(out, "{head}\n<PolyData>")?;
+        writeln!(out, "<Piece NumberOfPoints=\"{n}\" NumberOfPolys=\"{m}\">\n<Points>")?;
+        let points = points.all.iter().flat_map(|at| to_user(at, root));
+        array(out, ("points", "Float64\" NumberOfComponents=\"3"), points)?;
+        writeln!(out, "</Points>\n<Polys>")?;
+        array(out, ("connectivity", "Int64"), polygons.corners.iter())?;
+        array(out, ("offsets", "Int64"), polygons.ends.iter())?;
+        writeln!(out, "</Polys>\n<CellData>")?;
+        array(out, ("level", "UInt8"), faces.iter().map(|face| word::level(face.leaf)))?;
+        array(out, ("side", "UInt8"), faces.iter().map(|face| face.leaf & 3))?;
+        array(out, ("spacing", "Float64"), faces.iter().map(spacing))?;
+        Ok(writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")?)
     })
 }
 
-/// One value for each point or cell.
-fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
-    Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
-}
-
-/// Writes the polygons in VTK's format of XML.
-fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
-    let file = Vtk {
-        version: Version { major: 1, minor: 0 },
-        title: "front towards the body".into(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(piece),
-        file_path: None,
-    };
-    // The errors of vtkio do not say what the system said.
-    let mut bytes = Vec::new();
-    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
-    out.write_all(&bytes)
+/// Writes an array as text, one value on each line.
+fn array(
+    out: &mut dyn Write,
+    (name, kind): (&str, &str),
+    mut values: impl Iterator<Item = impl Display>,
+) -> io::Result<()> {
+    writeln!(out, "<DataArray Name=\"{name}\" type=\"{kind}\" format=\"ascii\">")?;
+    values.try_for_each(|value| writeln!(out, "{value}"))?;
+    writeln!(out, "</DataArray>")
 }
 
 /// Writes the polygons as triangles. Coordinates have single precision.
@@ -152,7 +137,7 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
         out.flush().map_err(|error| Failure::at(path, error))?;
-        export.options.watch.check()
+        Progress.check()
     })?;
     let closed = match open {
         0 => "closed".to_owned(),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{in_root, on_disk, options, whole};
+use crate::testing::{in_root, on_disk, whole};
 use contract::octant::Octant;
 use contract::testing::{random_words, words_with_sides};
 use contract::word::KEY_END;
@@ -16,7 +16,7 @@ fn both_sides_of_a_plate_are_open_at_the_boundary() {
         words_with_sides(|o| o.level < 3, |o| (o.corner[2] >> 16 != 3).then_some(Side::Outside));
     let (dir, mesh) = in_root(&words, 2, |i| i / 256, root);
     let path = dir.path().join("front.vtp");
-    let summary = vtp(&whole(&mesh, &options()), &path).unwrap();
+    let summary = vtp(&whole(&mesh), &path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!((summary.leaves, summary.bytes), (128, text.len() as u64));
     assert!(summary.notes[0].starts_with("a surface of area 128, open at 64 edges"), "{summary:?}");
@@ -34,7 +34,7 @@ fn the_triangles_of_a_file_are_as_closed_as_the_polygons() {
     );
     let (dir, mesh) = on_disk(&words, 1, |_| 0);
     let path = dir.path().join("front.stl");
-    let summary = stl(&whole(&mesh, &options()), &path).unwrap();
+    let summary = stl(&whole(&mesh), &path).unwrap();
     assert!(summary.notes[0].ends_with("closed"), "{summary:?}");
     let bytes = fs::read(path).unwrap();
     let number = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -61,7 +61,7 @@ const LEVEL: u8 = 4;
 
 fn faces(words: &[u64], parts: usize) -> Vec<Face> {
     let (_dir, mesh) = on_disk(words, parts, |i| i / 5);
-    front(&whole(&mesh, &options())).unwrap()
+    front(&whole(&mesh)).unwrap()
 }
 
 /// A square of the finest level: its minimum corner in finest cells, and its axis.
@@ -165,7 +165,7 @@ fn closed_words() -> impl Strategy<Value = Vec<u64>> {
 
 fn front_of(words: &[u64]) -> Front {
     let (_dir, mesh) = on_disk(words, 1, |_| 0);
-    Front::new(mesh.manifest.root, front(&whole(&mesh, &options())).unwrap())
+    Front::new(mesh.manifest.root, front(&whole(&mesh)).unwrap())
 }
 
 proptest! {

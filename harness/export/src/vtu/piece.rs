@@ -57,7 +57,7 @@ impl Encoder {
         self.check_invariants();
         for Leaf { octant, side, .. } in &self.leaves {
             self.written.add(octant, true);
-            self.digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
+            self.digest.add(word::encode(*octant, *side));
         }
         let Self { leaves, points, connectivity, zlib, .. } = self;
         let points = &points.all;

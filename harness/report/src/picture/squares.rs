@@ -6,11 +6,10 @@
 
 use super::colour::Colour;
 use super::plane_axes;
-use contract::failure::{Result, Watch};
+use contract::failure::Result;
 use contract::mesh::Mesh;
 use contract::octant::CELLS_PER_EDGE;
 use export::selection::Selection;
-use run::progress::Progress;
 
 /// Edge of the smallest square, in units of the page.
 const EDGE_MIN: f64 = 1.0;
@@ -74,7 +73,7 @@ impl Squares {
     ) -> Result<Self> {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let mut found = Self { level_outlined, level_drawn, ..Self::default() };
-        selection.visit(mesh, &|| Progress.check(), &mut |leaf| {
+        selection.visit(mesh, &mut |leaf| {
             let (octant, value) = (leaf.octant, colour.value(&leaf));
             let corner = axes.map(|a| octant.corner[a]);
             found.add(Square { corner, level: octant.level, value, leaves: 1 });

@@ -3,7 +3,7 @@
 use super::*;
 use contract::octant::Octant;
 use contract::testing::{leaf_set, random_words, words_of};
-use contract::word::{self, Leaf, Side, encode};
+use contract::word::{self, Side, encode};
 use export::selection::Selection;
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -125,7 +125,7 @@ proptest! {
 
 #[test]
 fn small_leaves_are_merged_and_the_greatest_value_counts() {
-    let leaf = |corner, side| encode(&Leaf { octant: Octant { corner, level: 19 }, side });
+    let leaf = |corner, side| encode(Octant { corner, level: 19 }, side);
     let mut words = vec![
         leaf([0; 3], Side::Outside),
         leaf([1, 0, 0], Side::Crossing),

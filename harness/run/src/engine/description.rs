@@ -26,20 +26,8 @@ pub fn is_own(name: &str) -> bool {
     OWN.iter().any(|(own, _)| *own == name)
 }
 
-/// Examples of keys that are often wrong.
-const EXAMPLES: [(&str, &str); 11] = [
-    ("program", "program = \"{here}/my-mesher\""),
-    ("serial", "serial = [\"my-mesher\", \"{case}\", \"{out}\"]"),
-    ("parallel", "parallel = [\"{launcher}\", \"my-mesher\", \"{case}\", \"{out}\"]"),
-    ("out", "out = [\"--out\", \"{out}\"]"),
-    ("json", "json = [\"--json\", \"{json}\"]"),
-    ("format", "format = \"vtk\""),
-    ("sides", "sides = \"side\" in [run], sides = { band_cells = 1.0 } in [promises]"),
-    ("keep", "keep = [\"all\"]"),
-    ("surface", "surface = { tolerance_cells = 0.5 }"),
-    ("balance", "balance = \"face\""),
-    ("independent_of", "independent_of = [\"ranks\"]"),
-];
+/// The page that has an example of every key.
+const PAGE: &str = include_str!("../../../engines/README.md");
 
 /// An engine file.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -163,8 +151,9 @@ impl Description {
     /// # Errors
     /// One sentence, if it is wrong.
     pub fn parse(text: &str) -> Result<Self> {
+        let page = PAGE.split_once("## Promises").map_or(PAGE, |(_, page)| page);
         let mut description: Self =
-            toml::from_str(text).map_err(|error| explain(text, &error, &EXAMPLES))?;
+            toml::from_str(text).map_err(|error| explain(text, &error, page))?;
         description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
         if let Some(first) = templates.serial.first().cloned() {

@@ -8,16 +8,17 @@
 //! - output that is about to get its final names gets all of them first.
 
 use super::session::{PATIENCE, end_all};
+use contract::failure::INTERRUPTED;
 use contract::files::publications;
 use files::OUT_OF_MEMORY;
-use files::interrupt::{self, INTERRUPTED};
+use files::interrupt;
 use rustix::process::{getpid, set_child_subreaper};
 use signal_hook::low_level::{exit, pipe};
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
@@ -31,7 +32,6 @@ const ATTEMPTS: usize = 20;
 const OUT_OF_MEMORY_BYTE: u8 = b'm';
 
 static WAKE: OnceLock<UnixStream> = OnceLock::new();
-static REQUESTED: AtomicBool = AtomicBool::new(false);
 /// The directory of all temporary files. Until it is known, a signal waits.
 static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
 
@@ -50,14 +50,14 @@ pub fn install() -> io::Result<()> {
                 clean();
                 exit(OUT_OF_MEMORY);
             }
-            REQUESTED.store(true, Ordering::SeqCst);
+            INTERRUPTED.store(true, Ordering::SeqCst);
             // A second signal, or the time limit.
             let _ = received.set_read_timeout(Some(GRACE));
             let _ = received.read_exact(&mut byte);
             // Whatever other threads do.
             clean();
             announce();
-            exit(INTERRUPTED);
+            exit(interrupt::INTERRUPTED);
         }
     };
     thread::Builder::new().name("signals".into()).spawn(wait)?;
@@ -88,7 +88,7 @@ pub fn uninstall() {
 
 /// Whether the user has interrupted the harness.
 pub fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+    INTERRUPTED.load(Ordering::SeqCst)
 }
 
 /// Prints that the harness was interrupted. Once: a command may be about to say so when its time is over.

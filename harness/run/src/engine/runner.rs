@@ -10,6 +10,7 @@ use super::service::{self, Services};
 use super::templates::{LAUNCHER, Values, fill};
 use crate::import;
 use clap::Args;
+use contract::case::Case;
 use contract::failure::{Failure as Refusal, named};
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
@@ -148,7 +149,7 @@ impl Engine {
         if takes.generator && takes.stl == StlForm::Any {
             return Ok(case.to_owned());
         }
-        Ok(PlainCase::read(case)?.write(directory, takes.stl)?)
+        Ok(PlainCase::of(&Case::read(case)?).write(directory, takes.stl)?)
     }
 
     /// The values of the placeholders that do not depend on a run.

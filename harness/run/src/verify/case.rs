@@ -8,12 +8,11 @@ use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
 use crate::engine::runner::Engine;
-use crate::progress::Progress;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
 use contract::catalogue::Selected;
-use contract::failure::Watch;
+use contract::failure::{Progress, Watch};
 use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.

@@ -14,10 +14,9 @@ pub mod report;
 
 use crate::engine::interrupt;
 use crate::engine::runner::Programs;
-use crate::progress::Progress;
 use case::CaseRun;
 use contract::catalogue::Selected;
-use contract::failure::{Failure, Result};
+use contract::failure::{Failure, Progress, Result};
 use contract::files::publications;
 use options::{Needs, Options};
 use report::{Asked, CaseReport, Report};

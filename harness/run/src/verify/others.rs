@@ -49,7 +49,7 @@ impl CaseRun<'_> {
             let judged = match need {
                 Need::Proof => self.prove(step, serial, base),
                 Need::Oracles => self.vote(step, case, &base.mesh),
-                _ => self.balance(step, &base.mesh),
+                _ => self.balance(step, case, &base.mesh),
             };
             let mut check = match judged {
                 Ok(check) => check,
@@ -111,10 +111,11 @@ impl CaseRun<'_> {
 
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
-    fn balance(&self, (subject, name): Step, base: &LeafSet) -> Result<Check, Failure> {
+    fn balance(&self, step: Step, case: &Case, base: &LeafSet) -> Result<Check, Failure> {
+        let (subject, name) = step;
         let left_out = |why| Ok(Check::new(subject, name, Outcome::left_out(why)));
-        let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
-        let written = plain(case).write(&self.place.join("plain-case"), self.engine().takes.stl)?;
+        let (case, place) = (plain(PlainCase::of(case)), self.place.join("plain-case"));
+        let written = case.write(&place, self.engine().takes.stl)?;
         let case = Case::read(&written).map_err(io::Error::other)?;
         if let Some(why) = self.engine().declines(&case) {
             return left_out(why);

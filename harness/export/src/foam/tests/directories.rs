@@ -26,7 +26,7 @@ fn patches_follow_the_internal_faces_and_lie_where_their_names_say() {
     let half = [[0; 3], [1 << 27, 1 << 27, 1 << 26]];
     let selection = Selection { clip: Some(half), ..Selection::default() };
     let target = dir.path().join("case/constant/polyMesh");
-    write(&Export { mesh: &mesh, selection: &selection, options: &options() }, &target).unwrap();
+    write(&export(&mesh, &selection), &target).unwrap();
     let complex = complex_in(&target);
     let boundary = boundary_in(&target);
     let faces: Vec<_> = boundary.iter().map(|(name, faces, _)| (name.as_str(), *faces)).collect();
@@ -71,11 +71,9 @@ fn regions_that_no_face_connects_can_be_left_out() {
     );
     let words: Vec<u64> = words.into_iter().filter(|&w| word::octant(w).corner != [0; 3]).collect();
     let (dir, mesh) = on_disk(&leaf_set(vec![words]));
-    let mut options = options();
     for (regions, cells) in [(Regions::All, 64), (Regions::Largest, 1)] {
-        options.regions = regions;
         let target = dir.path().join(format!("{cells}/constant/polyMesh"));
-        let summary = write(&whole(&mesh, &options), &target).unwrap();
+        let summary = write(&Export { regions, ..whole(&mesh) }, &target).unwrap();
         assert_eq!(summary.leaves, cells);
         assert!(
             summary.notes[1].starts_with("2 regions that no face connects: "),
@@ -91,21 +89,17 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
     let words = words_with_sides(|o| o.level < 2, |_| Some(Side::Outside));
     let (dir, mesh) = on_disk(&leaf_set(vec![words]));
     let case = dir.path().join("case");
-    let refused = |options: &Options<'_>, selection: &Selection| {
+    let refused = |selection: &Selection| {
         let target = case.join("constant/polyMesh");
-        write(&Export { mesh: &mesh, selection, options }, &target).unwrap_err().to_string()
+        write(&export(&mesh, selection), &target).unwrap_err().to_string()
     };
     let everything = Selection::default();
     let none = Selection { level_max: Some(1), ..Selection::default() };
-    assert!(refused(&options(), &none).contains("no leaf satisfies all conditions"));
+    assert!(refused(&none).contains("no leaf satisfies all conditions"));
     assert!(!case.exists());
 
-    write(
-        &Export { mesh: &mesh, selection: &everything, options: &options() },
-        &case.join("constant/polyMesh"),
-    )
-    .unwrap();
-    assert!(refused(&options(), &everything).contains("constant/polyMesh exists"));
+    write(&export(&mesh, &everything), &case.join("constant/polyMesh")).unwrap();
+    assert!(refused(&everything).contains("constant/polyMesh exists"));
     let names = |dir: &Path| {
         fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name()).collect::<BTreeSet<_>>()
     };
@@ -113,7 +107,7 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
 
     let empty = dir.path().join("other/constant/polyMesh");
     fs::create_dir_all(&empty).unwrap();
-    write(&Export { mesh: &mesh, selection: &everything, options: &options() }, &empty).unwrap();
+    write(&export(&mesh, &everything), &empty).unwrap();
     assert_eq!(names(&empty).len(), 7);
 }
 
@@ -165,17 +159,14 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
         Case::read(&dir.path().join("case.toml")).unwrap()
     };
     let (case, other) = (case(8.0), case(16.0));
-    let mut options = options();
-    options.case = Some(&case);
+    let of = |case| Export { case: Some(case), ..whole(&mesh) };
     let target = dir.path().join("case/constant/polyMesh");
-    write(&whole(&mesh, &options), &target).unwrap();
+    write(&of(&case), &target).unwrap();
     let faces: Vec<_> =
         boundary_in(&target).into_iter().map(|(name, faces, _)| (name, faces)).collect();
     let expected = [("left_wing", 6), ("body", 24 - 4 - 4), ("tail", 6)];
     assert_eq!(faces[6..], expected.map(|(name, faces)| (name.to_owned(), faces)));
-    options.case = Some(&other);
-    let error =
-        write(&whole(&mesh, &options), &dir.path().join("other/polyMesh")).unwrap_err().to_string();
+    let error = write(&of(&other), &dir.path().join("other/polyMesh")).unwrap_err().to_string();
     assert!(error.contains("not of the case"), "{error}");
 }
 
@@ -196,12 +187,7 @@ fn crossing_cells_and_solids_without_faces_produce_warnings() {
     let notes = |side: Side, selection: Selection| {
         let (dir, mesh) =
             on_disk(&leaf_set(vec![words_with_sides(|o| o.level < 1, |_| Some(side))]));
-        write(
-            &Export { mesh: &mesh, selection: &selection, options: &options() },
-            &dir.path().join("polyMesh"),
-        )
-        .unwrap()
-        .notes
+        write(&export(&mesh, &selection), &dir.path().join("polyMesh")).unwrap().notes
     };
     let all = notes(Side::Crossing, Selection::default());
     let expected = [

@@ -17,7 +17,7 @@ use crate::leaves::{CUT, Square};
 use crate::options::Label;
 use crate::points::Point;
 use crate::selection::Selection;
-pub use crate::testing::{options, whole};
+pub use crate::testing::{export, whole};
 use contract::mesh::Mesh as OnDisk;
 
 /// Faces with their points, and the cells on both sides of each.
@@ -78,25 +78,20 @@ fn leaves_of(words: &[u64], is_cut: impl Fn(u64) -> bool) -> Leaves {
 }
 
 /// The mesh of these leaves.
-pub fn mesh_of(words: &[u64], is_cut: impl Fn(u64) -> bool, options: &Options<'_>) -> Mesh {
+pub fn mesh_of(words: &[u64], is_cut: impl Fn(u64) -> bool) -> Mesh {
     let patches = Patches::new(None, true);
-    Mesh::new(leaves_of(words, is_cut), None, patches, options).unwrap()
+    Mesh::new(leaves_of(words, is_cut), None, patches, Regions::All).unwrap()
 }
 
 impl Leaves {
-    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Octant, &[Square])) {
-        let visit = &mut |cell, octant: &Octant, squares: &[Square]| {
-            each(cell, octant, squares);
-            Ok(())
-        };
-        self.walk(options, visit).unwrap();
+    fn visit_all(&self, mut each: impl FnMut(u32, &Octant, &[Square])) {
+        self.walk(&mut each).unwrap();
     }
 }
 
 /// The complex of sorted words, without files.
 fn complex_of(words: &[u64]) -> Complex {
-    let options = options();
-    let mesh = mesh_of(words, |_| false, &options);
+    let mesh = mesh_of(words, |_| false);
     let indices = |cells: &[u32]| cells.iter().map(|&cell| cell as usize).collect();
     Complex {
         points: mesh.points.all.iter().map(|p| p.map(f64::from)).collect(),
@@ -208,9 +203,7 @@ proptest! {
         let (dir, mesh) = on_disk(&leaf_set(vec![words]));
         let target = dir.path().join("case/constant/polyMesh");
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
-        let mut options = options();
-        options.label = label;
-        let summary = write(&whole(&mesh, &options), &target).unwrap();
+        let summary = write(&Export { label, ..whole(&mesh) }, &target).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
     }
@@ -224,7 +217,7 @@ proptest! {
         prop_assume!(!words.is_empty());
         let (dir, mesh) = on_disk(&leaf_set(vec![words.clone()]));
         let target = dir.path().join("case/constant/polyMesh");
-        let summary = write(&whole(&mesh, &options()), &target).unwrap();
+        let summary = write(&whole(&mesh), &target).unwrap();
         let complex = complex_in(&target);
         complex.assert_ordered();
         complex.assert_closed(words.len());
@@ -289,10 +282,9 @@ proptest! {
 
     #[test]
     fn points_are_the_corners_of_cells_and_of_the_squares_at_missing_cells(words in random_words(5), has_cut in any::<bool>()) {
-        let options = options();
-        let mesh = mesh_of(&words, |word| has_cut && is_cut(word), &options);
+        let mesh = mesh_of(&words, |word| has_cut && is_cut(word));
         let mut expected: BTreeSet<Point> = BTreeSet::new();
-        mesh.leaves.visit_all(&options, |_, octant, squares| {
+        mesh.leaves.visit_all(|_, octant, squares| {
             let edge = octant.edge();
             let corner = |digit: u32| std::array::from_fn(|a| octant.corner[a] + edge * (digit >> a & 1));
             expected.extend((0..8).map(corner));
@@ -305,13 +297,12 @@ proptest! {
 
     #[test]
     fn regions_are_the_cells_that_faces_connect(words in random_words(4), one_in in 1u64..5) {
-        let mut options = options();
         let holes = words.iter().copied().filter(|&w| contract::digest::mix(w) % 5 < u128::from(one_in));
         let words: Vec<u64> = holes.collect();
         let leaves = leaves_of(&words, is_cut);
         let cells = leaves.count() as usize;
         let (mut sets, mut volumes): (Vec<usize>, _) = ((0..cells).collect(), vec![0; cells]);
-        leaves.visit_all(&options, |cell, octant, squares| {
+        leaves.visit_all(|cell, octant, squares| {
             volumes[cell as usize] = word::span(octant.level);
             for across in squares.iter().filter_map(|square| square.across.as_cell()) {
                 let (a, b) = (sets[cell as usize], sets[across as usize]);
@@ -324,9 +315,8 @@ proptest! {
         // The one that has the first cell, of several that are as large.
         let region = sets[(0..cells).find(|&cell| expected[&sets[cell]] == *largest).unwrap()];
         let kept: Vec<usize> = (0..cells).filter(|&cell| sets[cell] == region).collect();
-        options.regions = Regions::Largest;
         let ranks = Some((0..cells as u32).map(|cell| cell % 7).collect());
-        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true), &options).unwrap();
+        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true), Regions::Largest).unwrap();
         prop_assert_eq!(mesh.regions, expected.len());
         // Its cells keep their ranks.
         let ranks: Vec<u32> = kept.iter().map(|&cell| cell as u32 % 7).collect();
