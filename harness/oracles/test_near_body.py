@@ -3,6 +3,7 @@
 The faces and areas are compared with those found by brute force from the leaf words and the geometry. Needs
 target/debug/{harness,reference}, which `cargo test --workspace` builds."""
 
+import base64
 import json
 import pathlib
 import re
@@ -37,9 +38,14 @@ def polygons(path):
     piece = xml.etree.ElementTree.parse(path).find(".//Piece")
     arrays = {}
     for array in piece.iter("DataArray"):
-        kind = {"Float64": float, "Int64": int, "UInt8": np.uint8}[array.get("type")]
-        arrays[array.get("Name")] = np.array(array.text.split(), kind)
-    corners, ends = arrays["connectivity"], arrays["offsets"]
+        kind = {"Float64": "<f8", "Int64": "<i8", "UInt64": "<u8", "UInt32": "<u4", "UInt8": "<u1"}[array.get("type")]
+        text = base64.b64decode(array.text.strip(), validate=True)
+        values = np.frombuffer(text, kind, offset=8)
+        name = array.get("Name", "points")
+        if int.from_bytes(text[:8], "little") != values.nbytes:
+            raise ValueError(f"{name}: has not the size that it states")
+        arrays[name] = values
+    corners, ends = arrays["connectivity"], arrays["offsets"].astype(int)
     sizes = np.diff(ends, prepend=0)
     if not (len(ends) == int(piece.get("NumberOfPolys")) and (sizes >= 4).all() and ends[-1] == len(corners)):
         raise ValueError("the polygons have not as many corners as the file states")
@@ -170,13 +176,14 @@ class NearBodyTest(InDirectory):
 
     def test_every_damage_to_the_polygons_is_noticed(self):
         def changes(content):
-            for array in re.finditer(rb'<DataArray Name="(\w+)"[^>]*>([^<]+)', content):
-                values = list(re.finditer(rb"[\d.]+", array[2]))
-                # The most significant digit of the first value, of one in the middle, and of the last one.
-                for value in (values[0], values[len(values) // 2], values[-1]):
-                    at = array.start(2) + value.start()
-                    yield f"{array[1]}, {at}", content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
-                yield f"{array[1]} without its last value", content[: array.start(2) + values[-1].start()] + content[array.end(2) :]
+            for array in re.finditer(rb'type="[A-Z]\w+?(\d+)"[^>]*>([A-Za-z0-9+/=]{16,})', content):
+                data = base64.b64decode(array[2])
+                size = int(array[1]) // 8
+                # The most significant byte of the size in bytes, of a value in the middle, and of the last one.
+                for position in (7, 8 + (len(data) - 8) // size // 2 * size + size - 1, len(data) - 1):
+                    changed = data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
+                    text = base64.b64encode(changed)
+                    yield f"{array[0][:40]}, {position}", content[: array.start(2)] + text + content[array.end(2) :]
             for part in (0.1, 0.5, 0.99):
                 yield part, content[: int(part * len(content))]
             faces = self.faces.encode()

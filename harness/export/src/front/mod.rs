@@ -16,7 +16,6 @@
 #[cfg(test)]
 mod tests;
 
-use std::fmt::Display;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -27,6 +26,10 @@ use contract::number::number;
 use contract::octant::edge_of;
 use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
+use vtkio::model::{
+    Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version,
+    VertexNumbers, Vtk,
+};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Summary, require_new};
@@ -80,33 +83,44 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>> {
 /// If the mesh cannot be read or has no such faces, if the file cannot be written, or if the user interrupts.
 pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
     write(export, path, &|Front { root, faces, points, polygons }, out| {
-        let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
-        let (n, m) = (points.all.len(), faces.len());
-        let head = "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\">";
-        writeln!(out, "{head}\n<PolyData>")?;
-        writeln!(out, "<Piece NumberOfPoints=\"{n}\" NumberOfPolys=\"{m}\">\n<Points>")?;
         let points = points.all.iter().flat_map(|at| to_user(at, root));
-        array(out, ("points", "Float64\" NumberOfComponents=\"3"), points)?;
-        writeln!(out, "</Points>\n<Polys>")?;
-        array(out, ("connectivity", "Int64"), polygons.corners.iter())?;
-        array(out, ("offsets", "Int64"), polygons.ends.iter())?;
-        writeln!(out, "</Polys>\n<CellData>")?;
-        array(out, ("level", "UInt8"), faces.iter().map(|face| word::level(face.leaf)))?;
-        array(out, ("side", "UInt8"), faces.iter().map(|face| face.leaf & 3))?;
-        array(out, ("spacing", "Float64"), faces.iter().map(spacing))?;
-        Ok(writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")?)
+        let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
+        let cell = vec![
+            array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
+            array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
+            array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
+        ];
+        let piece = PolyDataPiece {
+            points: points.collect::<Vec<f64>>().into(),
+            polys: Some(VertexNumbers::XML {
+                connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
+                offsets: polygons.ends.clone(),
+            }),
+            data: Attributes { point: Vec::new(), cell },
+            ..PolyDataPiece::default()
+        };
+        Ok(write_xml(piece, out)?)
     })
 }
 
-/// Writes an array as text, one value on each line.
-fn array(
-    out: &mut dyn Write,
-    (name, kind): (&str, &str),
-    mut values: impl Iterator<Item = impl Display>,
-) -> io::Result<()> {
-    writeln!(out, "<DataArray Name=\"{name}\" type=\"{kind}\" format=\"ascii\">")?;
-    values.try_for_each(|value| writeln!(out, "{value}"))?;
-    writeln!(out, "</DataArray>")
+/// One value for each point or cell.
+fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
+    Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
+}
+
+/// Writes the polygons in VTK's format of XML.
+fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
+    let file = Vtk {
+        version: Version { major: 1, minor: 0 },
+        title: "front towards the body".into(),
+        byte_order: ByteOrder::LittleEndian,
+        data: DataSet::inline(piece),
+        file_path: None,
+    };
+    // The errors of vtkio do not say what the system said.
+    let mut bytes = Vec::new();
+    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
+    out.write_all(&bytes)
 }
 
 /// Writes the polygons as triangles. Coordinates have single precision.
