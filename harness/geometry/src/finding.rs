@@ -102,10 +102,11 @@ impl Finding {
 }
 
 impl Kind {
-    /// Whether every occurrence can change the mesh's region. Openings, odd edges, duplicates and intersections are judged one by one.
+    /// Whether every occurrence can change the mesh's region. Openings, nested shells, duplicates and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
-            Self::Stray | Self::Overlaps | Self::Rounded | Self::OutsideRoot => true,
+            Self::NonManifoldOdd | Self::Overlaps => true,
+            Self::Stray | Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => keep != Keep::Outside,
             Self::ThinGaps => keep != Keep::Inside,
             _ => false,
@@ -196,9 +197,6 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
              depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
-        Kind::NonManifoldOdd if finding.count_changing == 0 => {
-            "No effect: one facet at each is a sliver without area, which no ray meets.".into()
-        }
         Kind::Duplicates if finding.count_changing == 0 => {
             "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, like none.".into()
         }
@@ -321,7 +319,7 @@ mod tests {
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
-        let always = [Kind::Stray, Kind::Overlaps];
+        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Overlaps];
         let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(

@@ -170,7 +170,7 @@ mod tests {
         let facets = vec![plane, across, [r, q, p]];
         let input = Input::new(facets, Requested::default()).unwrap();
         let lattice = &input.case.facets_lattice;
-        let shells = Shells::new(&Edges::new(&input.case.facets), lattice);
+        let shells = Shells::new(&Edges::new(&input.case.facets, lattice), lattice);
         let mut tree = FacetTree::new(lattice);
         let found = |tree: &FacetTree| {
             let finding = intersections(&input, tree, &shells, 5);

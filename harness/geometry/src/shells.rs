@@ -46,7 +46,7 @@ impl Shell {
 pub struct Shells {
     /// All shells, in the order of their first facets.
     pub all: Vec<Shell>,
-    /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
+    /// The index of every facet's shell; [`u32::MAX`] for a facet without edges, which belongs to none.
     pub of: Vec<u32>,
 }
 
@@ -59,10 +59,8 @@ impl Shells {
         }
         let mut all: Vec<Shell> = Vec::new();
         let mut of = vec![u32::MAX; edges.corners.len()];
-        for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
-            if a == b || b == c || c == a {
-                continue;
-            }
+        for (facet, _) in edges.corners.iter().enumerate().filter(|(_, corners)| corners.is_some())
+        {
             // The representative is the lowest facet, so its shell exists before those of its other facets.
             let first = sets.root(facet as u32);
             if first as usize == facet {
