@@ -163,8 +163,8 @@ pub fn stray(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     finding
 }
 
-/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one, and two with a solid behind each, by the numbers of
-/// `solids`, are where solids touch. A facet that is left out of the edges is no duplicate.
+/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. Two with a solid behind each, by the numbers of
+/// `solids`, are where solids touch: a wall, if the inside is meshed. A facet that is left out of the edges is no duplicate.
 pub fn duplicates(
     input: &Input,
     edges: &Edges,
@@ -183,7 +183,9 @@ pub fn duplicates(
     }
     let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
     let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
-    let changing = copies.values().filter(|copies| copies.len() % 2 == 0 && !touch(copies));
+    let passes = |copies: &[u32]| copies.len() % 2 == 1 || !input.is_meshed(true) && touch(copies);
+    let changing =
+        copies.values().filter(|copies| input.are_seeds_beyond != Some(true) && !passes(copies));
     finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();
     finding
 }

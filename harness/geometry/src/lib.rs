@@ -44,7 +44,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     }
     findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
-        if finding.kind.changes_region(input.case.keep) {
+        if finding.kind.changes_region(input) {
             finding.count_changing = finding.count;
         }
         finding.meaning = finding::meaning(finding, input);

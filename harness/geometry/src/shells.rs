@@ -1,7 +1,7 @@
 //! Shells: components of facets that are connected by shared edges.
 
 use contract::lattice::{FacetLattice, dot, normal};
-use contract::manifest::Keep;
+use contract::manifest::Enclosed;
 use contract::parity::Parity;
 use contract::sets::Sets;
 
@@ -23,18 +23,13 @@ pub struct Shell {
     volume_sixfold: i128,
     /// Whether it is closed and lies in an odd number of other closed shells, so that its interior is outside.
     is_nested: bool,
+    /// Whether it is wound the other way than the nearest closed shell around it.
+    is_cavity: bool,
     /// On the lattice, whose coordinates are exact in f64.
     bounds: Aabb,
 }
 
 impl Shell {
-    fn add(&mut self, facet: &FacetLattice) {
-        self.volume_sixfold += dot(facet[0], normal(facet));
-        for vertex in facet {
-            self.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
-        }
-    }
-
     /// Whether the bounding box lies in the interior of that of the other shell.
     fn may_be_in(&self, other: &Self) -> bool {
         let (inner, outer) = (self.bounds, other.bounds);
@@ -71,11 +66,16 @@ impl Shells {
                     is_oriented: true,
                     volume_sixfold: 0,
                     is_nested: false,
+                    is_cavity: false,
                     bounds: Aabb::new_invalid(),
                 });
             }
             of[facet] = of[first as usize];
-            all[of[facet] as usize].add(&lattice[facet]);
+            let shell = &mut all[of[facet] as usize];
+            shell.volume_sixfold += dot(lattice[facet][0], normal(&lattice[facet]));
+            for vertex in lattice[facet] {
+                shell.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
+            }
         }
         for uses in edges.iter() {
             let shell = &mut all[of[uses[0].facet as usize] as usize];
@@ -95,8 +95,11 @@ impl Shells {
                 interior.inside(corner) == [true; 6]
             };
             let may_be_in = |other: &&usize| all[index].may_be_in(&all[**other]);
-            let around = closed.iter().filter(may_be_in).filter(|other| contains(other)).count();
-            all[index].is_nested = around % 2 == 1;
+            let around = closed.iter().filter(may_be_in).filter(|other| contains(other));
+            let around: Vec<i128> = around.map(|other| all[*other].volume_sixfold).collect();
+            all[index].is_nested = around.len() % 2 == 1;
+            let nearest = around.into_iter().min_by_key(|volume| volume.abs()).unwrap_or(1);
+            all[index].is_cavity = (nearest < 0) != (all[index].volume_sixfold < 0);
         }
         Self { all, of }
     }
@@ -124,7 +127,11 @@ impl Shells {
                 continue;
             }
             let at = usize::from(shell.is_nested);
-            let changes = !is_wound_inward && input.case.keep != Keep::Outside;
+            // A solid in a solid is a space, which is meshed with what is around it, with enclosed space, or from a seed in it.
+            let is_enclosed_kept = input.case.enclosed == Enclosed::Keep;
+            let is_kept = input.are_seeds_beyond.map_or(is_enclosed_kept, |are_beyond| !are_beyond);
+            let is_space = shell.is_nested && !(shell.is_oriented && shell.is_cavity);
+            let changes = is_space && (is_kept || input.is_meshed(true));
             findings[at].count_changing += u64::from(changes);
             let facet = shell.facet_first;
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
