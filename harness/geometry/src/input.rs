@@ -57,10 +57,8 @@ impl Input {
     /// If a file cannot be read or the geometry cannot be meshed.
     pub fn read(path: &Path, requested: Requested) -> Result<Self> {
         let wrong = |why: String| Failure::about(path, why);
-        let (table, Body { facets, solids }, seeds) = if path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-        {
+        let is_case = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        let (table, Body { facets, solids }, seeds) = if is_case {
             let Case { facets, solids, seeds, .. } = Case::read(path)?;
             let text = files::read_text(path).map_err(|e| wrong(e.to_string()))?;
             let mut table: Table = text.parse().map_err(|_| wrong("it has changed".into()))?;

@@ -4,11 +4,12 @@ use contract::lattice::{FacetLattice, dot, normal};
 use contract::manifest::Enclosed;
 use contract::parity::Parity;
 use contract::sets::Sets;
+use parry3d_f64::bounding_volume::BoundingVolume as _;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::tree::{Aabb, Point};
+use super::tree::{Aabb, triangle};
 use std::collections::HashMap;
 
 /// A shell.
@@ -54,8 +55,7 @@ impl Shells {
         }
         let mut all: Vec<Shell> = Vec::new();
         let mut of = vec![u32::MAX; edges.corners.len()];
-        for (facet, _) in edges.corners.iter().enumerate().filter(|(_, corners)| corners.is_some())
-        {
+        for (facet, _) in edges.corners.iter().enumerate().filter(|(_, ends)| ends.is_some()) {
             // The representative is the lowest facet, so its shell exists before those of its other facets.
             let first = sets.root(facet as u32);
             if first as usize == facet {
@@ -73,9 +73,7 @@ impl Shells {
             of[facet] = of[first as usize];
             let shell = &mut all[of[facet] as usize];
             shell.volume_sixfold += dot(lattice[facet][0], normal(&lattice[facet]));
-            for vertex in lattice[facet] {
-                shell.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
-            }
+            shell.bounds.merge(&triangle(&lattice[facet]).local_aabb());
         }
         for uses in edges.iter() {
             let shell = &mut all[of[uses[0].facet as usize] as usize];

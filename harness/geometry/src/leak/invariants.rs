@@ -9,7 +9,7 @@
 //! - The narrowest place is a point of the path; its width lies between its bounds, is no more than that of any point that counts, and is
 //!   twice the distance to the nearest facet, which is one of the rim.
 
-use super::report::{Narrowest, Passage, Point as Stop};
+use super::report::{Passage, Point as Stop};
 use super::{Target, leaf_at};
 use crate::tree::{Point, from_edges, from_point, met, triangle};
 use contract::case::Case;
@@ -65,8 +65,7 @@ impl Passage {
     /// Whether no base tree of a finer spacing has a wider path: an opening wider than the diagonals of two cells is open at their spacing. An
     /// end may be narrower, as no opening is.
     pub fn is_widest(&self) -> bool {
-        let Narrowest { width_max, is_end, .. } = self.narrowest;
-        is_end || width_max >= 2.0 * 3f64.sqrt() * self.spacing.spacing
+        self.narrowest.is_end || self.narrowest.width_max >= 12f64.sqrt() * self.spacing.spacing
     }
 
     /// Compares the legs with all facets; `least` is the clearance of those that count.

@@ -94,34 +94,31 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         }
         let spacing = Spacing::of(level, root);
         let (widest, outside) = self.leaks(level, ends)?;
-        let is_leak = widest.is_some();
+        let (is_leak, closes, passage) = (widest.is_some(), None, None);
         let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
         let is_enclosed = !is_leak && to == Target::Far && is_outside && self.case.seeds.is_empty();
-        let (closes, passage) = (None, None);
         let mut report = Report { from, to, spacing, is_leak, is_enclosed, closes, passage };
         if let Some(finest) = widest {
             // The widest opening is as wide as the leaves of a path, or 4 times those two levels below. There its ball's centre lies in
             // free leaves: no finer tree has a wider path. The coarsest tree that joins the ends may do so through the finer cells of a
             // box, and close a wider opening.
-            const DEEPER: u8 = 2;
             report.closes = self.coarsen(ends, outside, finest)?;
-            for measured in level.min(finest + DEEPER)..=level {
+            for measured in level.min(finest + 2)..=level {
                 self.make_tree(measured)?;
                 self.watch.step("measuring the width");
                 let outside = outside.map(|level| &self.trees[&level][..]);
                 let words = &self.trees[&measured];
                 let space = Space::new(words, &self.facets, outside)?;
                 let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
-                // A narrow place at the start, which no opening is, may hide a wider path.
-                if measured < level && !passage.is_widest() {
-                    continue;
+                // Otherwise, a narrow place at the start, which no opening is, may hide a wider path.
+                if measured == level || passage.is_widest() {
+                    passage.check_invariants(self.case, (words, outside), (from, to));
+                    // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
+                    let cell = passage.narrowest.cell_of_boxes;
+                    report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
+                    report.passage = Some(passage);
+                    break;
                 }
-                passage.check_invariants(self.case, (words, outside), (from, to));
-                // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
-                let cell = passage.narrowest.cell_of_boxes;
-                report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
-                report.passage = Some(passage);
-                break;
             }
         }
         Ok(report)
@@ -183,9 +180,8 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             let is_end_crossed = self.crossed(level, ends).is_some();
             let joined = if is_end_crossed { None } else { self.search(level, ends, far)? };
             let Some(leaves) = joined else {
-                let spacing = Spacing::of(level, &self.case.root);
-                let is_closed = !is_end_crossed || finest <= level + 1;
-                return Ok(is_closed.then_some(Closes { spacing, is_end_crossed }));
+                let at = Closes { spacing: Spacing::of(level, &self.case.root), is_end_crossed };
+                return Ok((!is_end_crossed || finest <= level + 1).then_some(at));
             };
             finest = leaves;
         }
