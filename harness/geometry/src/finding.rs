@@ -20,7 +20,7 @@ pub enum Kind {
     Winding,
     /// Closed shells of consistent winding that enclose a negative volume, apart from [`Self::Nested`] ones.
     InsideOut,
-    /// Closed shells that lie in an odd number of other closed ones.
+    /// Closed shells that lie in an odd number of others.
     Nested,
     /// Facets without area with a corner, or the middle of an edge, on no facet with area.
     Stray,
@@ -124,7 +124,7 @@ impl Kind {
                 "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
             Self::InsideOut => ("closed shells inside out",
                 "No effect, but normals point inward: other programs may exchange inside and outside."),
-            Self::Nested => ("closed shells in closed shells",
+            Self::Nested => ("closed shells in other shells",
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
             Self::Stray => ("facets without area, apart",
                 "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. Remove them."),

@@ -22,9 +22,9 @@ pub struct Shell {
     is_oriented: bool,
     /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
     volume_sixfold: i128,
-    /// Whether it is closed and lies in an odd number of other closed shells, so that its interior is outside.
+    /// Whether it is closed and lies in an odd number of other shells, by all rays, so that its interior is outside.
     is_nested: bool,
-    /// Whether it is wound the other way than the nearest closed shell around it.
+    /// Whether it is wound the other way than the nearest shell around it.
     is_cavity: bool,
     /// On the lattice, whose coordinates are exact in f64.
     bounds: Aabb,
@@ -92,9 +92,10 @@ impl Shells {
                 let interior = interiors.entry(*other).or_insert_with(|| Parity::new(&own[*other]));
                 interior.inside(corner) == [true; 6]
             };
-            let may_be_in = |other: &&usize| all[index].may_be_in(&all[**other]);
-            let around = closed.iter().filter(may_be_in).filter(|other| contains(other));
-            let around: Vec<i128> = around.map(|other| all[*other].volume_sixfold).collect();
+            let may_be_in = |other: &usize| all[index].may_be_in(&all[*other]);
+            // Not only closed ones: edges at T-junctions and narrow holes are open, too.
+            let around = (0..all.len()).filter(may_be_in).filter(|other| contains(other));
+            let around: Vec<i128> = around.map(|other| all[other].volume_sixfold).collect();
             all[index].is_nested = around.len() % 2 == 1;
             let nearest = around.into_iter().min_by_key(|volume| volume.abs()).unwrap_or(1);
             all[index].is_cavity = (nearest < 0) != (all[index].volume_sixfold < 0);
@@ -116,7 +117,7 @@ impl Shells {
         a != b && p.is_closed && q.is_closed && !p.may_be_in(q) && !q.may_be_in(p)
     }
 
-    /// Closed shells that are inside out, and those that lie in an odd number of other closed ones.
+    /// Closed shells that are inside out, and those that lie in an odd number of others.
     pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
         let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
         for shell in &self.all {

@@ -199,6 +199,15 @@ fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
     }
     let nested = [cube(), cuboid([1.0; 3], [3.0; 3])].concat();
     assert!(case(&nested, "enclosed = 'keep'").changes_region);
+    // A vertex on an edge and a narrow hole open the edges of the shell around it.
+    let [a, b, c] = nested[0];
+    let [middle, off] = [0.0, 0.01].map(|by| [0, 1, 2].map(|x| (b[x] + c[x]) / 2.0 + by));
+    for middle in [middle, off] {
+        let parts = vec![[a, b, middle], [a, middle, c]];
+        let found = case(&[&nested[1..], &parts].concat(), "keep = 'inside'");
+        assert_eq!((found.shells.closed, count(&found, Kind::Nested)), (1, 1), "{found}");
+        assert!(found.changes_region);
+    }
     // Both solids inside out are the same; one of them alone makes the inner one a cavity.
     let reversed = |i: usize, facet: &Facet, at: &[usize]| {
         let [a, b, c] = *facet;
