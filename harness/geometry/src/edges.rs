@@ -1,12 +1,13 @@
 //! Vertices and edges that facets share, by sorting.
 //!
-//! Facets with a repeated vertex are left out of the edges: they add an even number of facets to the one edge
-//! that they have, and no ray counts them.
+//! Facets with a repeated vertex are left out: they add an even number of facets to the one edge that they have, and no ray counts
+//! them. So are slivers, which have no area on the lattice, if another sliver has the same vertices, or if at most one of their edges has
+//! other facets: their edges lie on one another.
 
 use contract::case::Facet;
-use contract::lattice::{self, normal, sorted};
+use contract::lattice::{self, FacetLattice, normal, sorted};
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -44,8 +45,8 @@ pub struct EdgeCounts {
 
 /// Vertices by number, and the facets at every edge.
 pub struct Edges {
-    /// Vertex numbers of every facet, in ascending order of coordinate bits.
-    pub corners: Vec<[u32; 3]>,
+    /// Vertex numbers of every facet, in ascending order of coordinate bits; none of one that is left out.
+    pub corners: Vec<Option<[u32; 3]>>,
     /// Coordinates of the vertices, in the user's units.
     pub points: Vec<[f64; 3]>,
     /// Sorted.
@@ -53,20 +54,36 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets.
-    pub fn new(facets: &[Facet]) -> Self {
-        let (corners, points) = number(facets);
-        let mut uses = Vec::with_capacity(3 * corners.len());
-        for (&[a, b, c], facet) in corners.iter().zip(0..) {
-            if a == b || b == c || c == a {
+    /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets, which are also given on the lattice.
+    pub fn new(facets: &[Facet], lattice: &[FacetLattice]) -> Self {
+        let (numbers, points) = number(facets);
+        let is_sliver = |facet: u32| normal(&lattice[facet as usize]) == [0; 3];
+        let (mut corners, mut slivers) = (vec![None; facets.len()], HashSet::new());
+        let mut uses = Vec::with_capacity(3 * facets.len());
+        for (&[a, b, c], facet) in numbers.iter().zip(0..) {
+            let is_copy = is_sliver(facet) && !slivers.insert(sorted([a, b, c]));
+            if a == b || b == c || c == a || is_copy {
                 continue;
             }
+            corners[facet as usize] = Some([a, b, c]);
             for ends in lattice::edges(&[a, b, c]) {
                 uses.push(Use { ends: sorted(ends), facet, is_down: ends[0] > ends[1] });
             }
         }
         uses.sort_unstable();
-        Self { corners, points, uses }
+        let mut edges = Self { corners, points, uses };
+        // A sliver that is left out leaves edges to others.
+        loop {
+            let alone = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0].facet);
+            let mut edges_alone: HashMap<u32, u32> = HashMap::new();
+            alone.filter(|f| is_sliver(*f)).for_each(|f| *edges_alone.entry(f).or_default() += 1);
+            edges_alone.retain(|_, count| *count > 1);
+            if edges_alone.is_empty() {
+                return edges;
+            }
+            edges_alone.keys().for_each(|facet| edges.corners[*facet as usize] = None);
+            edges.uses.retain(|one| !edges_alone.contains_key(&one.facet));
+        }
     }
 
     /// The facets at every edge.
@@ -111,21 +128,14 @@ fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
 }
 
 /// Edges with an odd number of facets, more than one, and pairs of neighbours with inconsistent winding.
-pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
+pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
     let mut findings = [Kind::NonManifoldOdd, Kind::Winding].map(Finding::new);
-    let alone = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0].facet);
-    let mut edges_alone: HashMap<u32, u32> = HashMap::new();
-    alone.for_each(|facet| *edges_alone.entry(facet).or_default() += 1);
-    // It has a single edge in common with others, and no area that a ray could meet.
-    let is_sliver = |facet: u32| !has_area(input, facet) && edges_alone.get(&facet) == Some(&2);
     for uses in edges.iter() {
         let at = match uses {
             [a, b] if a.is_down == b.is_down => 1,
             [_, _, _, ..] if uses.len() % 2 == 1 => 0,
             _ => continue,
         };
-        let met = uses.iter().filter(|one| !is_sliver(one.facet)).count();
-        findings[at].count_changing += u64::from(at == 0 && met % 2 == 1);
         findings[at].add(first, || {
             let [p, q] = uses[0].ends.map(|v| edges.points[v as usize]);
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
@@ -135,29 +145,26 @@ pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
     findings
 }
 
-fn has_area(input: &Input, facet: u32) -> bool {
-    normal(&input.case.facets_lattice[facet as usize]) != [0; 3]
-}
-
 /// Facets without area with a corner, or the middle of an edge, on no facet with area, as where a strip of triangles continues elsewhere. One
 /// on the others, as of a T-junction, changes nothing.
 pub fn stray(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Stray);
+    let has_area = |facet: u32| normal(&input.case.facets_lattice[facet as usize]) != [0; 3];
     let is_off = |[p, q]: [[i64; 3]; 2]| {
         let middle = Point::from_array([0, 1, 2].map(|a| (p[a] + q[a]) as f64 / 2.0));
-        !tree.within(middle, TOUCHING).iter().any(|&facet| has_area(input, facet))
+        !tree.within(middle, TOUCHING).iter().any(|&facet| has_area(facet))
     };
     for (facet, corners) in (0..).zip(&input.case.facets_lattice) {
         let ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));
-        if !has_area(input, facet) && ends.into_iter().any(is_off) {
+        if !has_area(facet) && ends.into_iter().any(is_off) {
             finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
     }
     finding
 }
 
-/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one, and two with a solid behind each, by the numbers of
-/// `solids`, are where solids touch. A facet with a repeated vertex is degenerate, not a duplicate.
+/// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. Two with a solid behind each, by the numbers of
+/// `solids`, are where solids touch: a wall, if the inside is meshed. A facet that is left out of the edges is no duplicate.
 pub fn duplicates(
     input: &Input,
     edges: &Edges,
@@ -166,8 +173,8 @@ pub fn duplicates(
 ) -> Finding {
     let mut finding = Finding::new(Kind::Duplicates);
     let mut copies: HashMap<_, Vec<u32>> = HashMap::new();
-    let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
-    for (corners, facet) in all.filter(|([a, b, c], _)| a != b && b != c) {
+    for (corners, facet) in edges.corners.iter().zip(0u32..) {
+        let Some(corners) = corners.map(sorted) else { continue };
         let copies = copies.entry(corners).or_default();
         copies.push(facet);
         if copies[0] != facet {
@@ -176,7 +183,9 @@ pub fn duplicates(
     }
     let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
     let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
-    let changing = copies.values().filter(|copies| copies.len() % 2 == 0 && !touch(copies));
+    let passes = |copies: &[u32]| copies.len() % 2 == 1 || !input.is_meshed(true) && touch(copies);
+    let changing =
+        copies.values().filter(|copies| input.are_seeds_beyond != Some(true) && !passes(copies));
     finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();
     finding
 }
@@ -190,8 +199,13 @@ mod tests {
     const C: [f32; 3] = [0.0, 1.0, 0.0];
     const D: [f32; 3] = [0.0, 0.0, 1.0];
 
+    fn edges(facets: &[Facet]) -> Edges {
+        let lattice = facets.iter().map(|facet| facet.map(|v| v.map(|c| c as i64)));
+        Edges::new(facets, &lattice.collect::<Vec<_>>())
+    }
+
     fn sizes(facets: &[Facet]) -> Vec<usize> {
-        let mut sizes: Vec<usize> = Edges::new(facets).iter().map(<[Use]>::len).collect();
+        let mut sizes: Vec<usize> = edges(facets).iter().map(<[Use]>::len).collect();
         sizes.sort_unstable();
         sizes
     }
@@ -204,12 +218,31 @@ mod tests {
 
     #[test]
     fn the_two_zeros_are_one_vertex() {
-        let edges = Edges::new(&[[A, B, C], [[-0.0, 0.0, -0.0], C, D]]);
-        assert_eq!((edges.points.len(), edges.corners[0][0] == edges.corners[1][0]), (4, true));
+        let edges = edges(&[[A, B, C], [[-0.0, 0.0, -0.0], C, D]]);
+        let first = |facet: usize| edges.corners[facet].map(|corners| corners[0]);
+        assert_eq!((edges.points.len(), first(0)), (4, first(1)));
     }
 
     #[test]
     fn a_facet_with_a_repeated_vertex_has_no_edges() {
         assert!(sizes(&[[A, B, A], [C, C, C]]).is_empty());
+    }
+
+    /// Copies of a sliver, and chains of slivers, lie on the edge at their end.
+    #[test]
+    fn slivers_that_end_at_one_edge_have_no_edges() {
+        let [p, q, r] = [4.0, 6.0, 8.0].map(|x| [x, 0.0, 0.0]);
+        let (sliver, chained) = ([A, p, r], [p, r, q]);
+        let solid = [[A, C, r], [A, r, D], [A, D, C], [r, C, D]];
+        for slivers in
+            [&[sliver][..], &[sliver; 4], &[sliver, chained], &[chained, chained, sliver]]
+        {
+            assert_eq!(sizes(&[&solid[..], slivers].concat()), [2; 6], "{slivers:?}");
+        }
+        // One between a facet's edge and its parts stays, but not its copy nor what ends at it; a fin at a part of one has three facets.
+        let stitched = [[A, C, r], [A, p, D], [p, r, D], [A, D, C], [r, C, D]];
+        assert_eq!(sizes(&[&stitched[..], &[sliver, sliver, chained]].concat()), [2; 9]);
+        let fin = sizes(&[&solid[..], &[sliver, [p, r, [0.0, 0.0, -9.0]]]].concat());
+        assert_eq!(fin[fin.len() - 1], 3);
     }
 }

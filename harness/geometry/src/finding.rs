@@ -1,7 +1,6 @@
 //! The findings of a diagnosis: kinds, counts and places, and what each kind means for the mesh.
 
 use contract::lattice::UNITS_PER_EDGE;
-use contract::manifest::Keep;
 use contract::number::number;
 use contract::octant::LEVEL_MAX;
 use serde::Serialize;
@@ -21,7 +20,7 @@ pub enum Kind {
     Winding,
     /// Closed shells of consistent winding that enclose a negative volume, apart from [`Self::Nested`] ones.
     InsideOut,
-    /// Closed shells that lie in an odd number of other closed ones.
+    /// Closed shells that lie in an odd number of others.
     Nested,
     /// Facets without area with a corner, or the middle of an edge, on no facet with area.
     Stray,
@@ -102,12 +101,13 @@ impl Finding {
 }
 
 impl Kind {
-    /// Whether every occurrence can change the mesh's region. Openings, odd edges, duplicates and intersections are judged one by one.
-    pub fn changes_region(self, keep: Keep) -> bool {
+    /// Whether every occurrence can change the mesh's region. Openings, nested shells, duplicates and intersections are judged one by one.
+    pub fn changes_region(self, input: &Input) -> bool {
         match self {
-            Self::Stray | Self::Overlaps | Self::Rounded | Self::OutsideRoot => true,
-            Self::ThinWalls => keep != Keep::Outside,
-            Self::ThinGaps => keep != Keep::Inside,
+            Self::NonManifoldOdd | Self::Overlaps => input.are_seeds_beyond != Some(true),
+            Self::Stray | Self::Rounded | Self::OutsideRoot => true,
+            Self::ThinWalls => input.is_meshed(true),
+            Self::ThinGaps => input.is_meshed(false),
             _ => false,
         }
     }
@@ -124,14 +124,14 @@ impl Kind {
                 "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
             Self::InsideOut => ("closed shells inside out",
                 "No effect, but normals point inward: other programs may exchange inside and outside."),
-            Self::Nested => ("closed shells in closed shells",
+            Self::Nested => ("closed shells in other shells",
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
             Self::Stray => ("facets without area, apart",
                 "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. Remove them."),
             Self::Duplicates => ("duplicate facets",
-                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Keep one of the copies where the body ends, and none within it."),
+                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Keep one of the copies where the body ends, and none within it: two are a wall in the inside."),
             Self::Intersections => ("intersecting pairs of facets",
-                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
+                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Where they touch, there is a wall in the inside. Unite the shells if that is not meant."),
             Self::Overlaps => ("facets within another solid",
                 "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity. Unite them if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
@@ -183,6 +183,11 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
     let finest = input.case.root.edge_of(LEVEL_MAX);
     match finding.kind {
+        Kind::NonManifoldOdd | Kind::Duplicates | Kind::Intersections | Kind::Overlaps
+            if input.are_seeds_beyond == Some(true) =>
+        {
+            "No effect: seeds and not rays say what is flow, and all of them lie beyond the body.".into()
+        }
         Kind::Openings if width < finest => {
             "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
         }
@@ -196,11 +201,8 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
              depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
-        Kind::NonManifoldOdd if finding.count_changing == 0 => {
-            "No effect: one facet at each is a sliver without area, which no ray meets.".into()
-        }
         Kind::Duplicates if finding.count_changing == 0 => {
-            "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, like none.".into()
+            "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, are a wall only where the inside is meshed.".into()
         }
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
@@ -221,8 +223,12 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
 mod tests {
     use super::*;
     use crate::input::Requested;
+    use contract::case::Facet;
     use contract::lattice::Root;
+    use contract::manifest::Keep;
     use contract::octant::CELLS_PER_EDGE;
+
+    const FACET: Facet = [[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]];
 
     /// The root's finest cell is 1 wide, and with a spacing the cells at the surface are 4.
     fn input(with_cell: bool) -> Input {
@@ -230,7 +236,7 @@ mod tests {
         let root = Some(Root { origin: [0.0; 3], edge });
         let requested =
             Requested { spacing_min: with_cell.then_some(4.0), root, ..Requested::default() };
-        Input::new(vec![[[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]]], requested).unwrap()
+        Input::new(vec![FACET], requested).unwrap()
     }
 
     /// The meaning of places of which the first is this wide.
@@ -319,9 +325,12 @@ mod tests {
         let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.row().0).collect();
         assert_eq!(titles.len(), kinds.len());
         let changing = |keep| {
-            kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
+            let keep = toml::Value::try_from(keep).unwrap();
+            let table = toml::Table::from_iter([("keep".to_owned(), keep)]);
+            let input = Input::of(table, vec![FACET], Requested::default()).unwrap();
+            kinds.into_iter().filter(|kind| kind.changes_region(&input)).collect::<Vec<_>>()
         };
-        let always = [Kind::Stray, Kind::Overlaps];
+        let always = [Kind::NonManifoldOdd, Kind::Stray, Kind::Overlaps];
         let all = [&always[..], &[Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot]].concat();
         assert_eq!(changing(Keep::All), all);
         assert_eq!(

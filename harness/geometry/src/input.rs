@@ -5,7 +5,8 @@ use std::path::Path;
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
 use contract::lattice::Root;
-use contract::manifest::ExtentBox;
+use contract::manifest::{ExtentBox, Keep};
+use contract::parity::Parity;
 use contract::stl::{self, Body};
 use parry3d_f64::bounding_volume::BoundingVolume as _;
 use serde::Serialize;
@@ -40,6 +41,10 @@ pub struct Extent {
 pub struct Input {
     /// A case of at least one and at most 2^31 / 3 facets, without seeds.
     pub case: Case,
+    /// Whether all seeds lie beyond the body's bounding box, and only what they reach is kept; none without seeds.
+    pub are_seeds_beyond: Option<bool>,
+    /// Whether rays of what is kept count an odd number of facets: those of the seeds, if there are any.
+    rays: Vec<bool>,
     /// Edge length of the cells at the surface, in the user's units; none if no spacing was given.
     pub cell: Option<f64>,
 }
@@ -52,17 +57,26 @@ impl Input {
     pub fn read(path: &Path, requested: Requested) -> Result<Self> {
         let wrong = |why: String| Failure::about(path, why);
         let is_case = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-        let (mut table, Body { facets, solids }) = match is_case {
+        let (mut table, Body { facets, solids }, seeds) = match is_case {
             true => {
-                let Case { table, facets, solids, .. } = Case::read(path)?;
-                (table, Body { facets, solids })
+                let Case { table, facets, solids, seeds, .. } = Case::read(path)?;
+                (table, Body { facets, solids }, seeds)
             }
-            false => (Table::new(), stl::read(path)?),
+            false => (Table::new(), stl::read(path)?, Vec::new()),
         };
         // A seed may lie beyond another root.
         table.retain(|key, _| key != "seeds" && (key != "root" || requested.root_scale.is_none()));
         let mut input = Self::of(table, facets, requested).map_err(wrong)?;
         input.case.solids = solids;
+        if !seeds.is_empty() {
+            let at = seeds.iter().filter_map(|&seed| input.case.root.quantise(seed));
+            let parity = Parity::new(&input.case.facets_lattice);
+            input.rays = at.flat_map(|at| parity.inside(at)).collect();
+            let body = bounds(&input.case.facets);
+            let is_beyond = |&seed: &[f64; 3]| !body.contains_local_point(Point::from(seed));
+            let are_beyond = seeds.iter().all(is_beyond) && input.case.keep != Keep::All;
+            input.are_seeds_beyond = Some(are_beyond);
+        }
         Ok(input)
     }
 
@@ -76,7 +90,10 @@ impl Input {
     }
 
     /// A geometry with the keys of its case file that no other ones replace.
-    fn of(mut table: Table, facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// As [`Self::new`], or if a key is not one of a case file.
+    pub fn of(mut table: Table, facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
         if facets.is_empty() {
             return Err("the geometry has no facets".to_owned());
         }
@@ -89,7 +106,13 @@ impl Input {
         table.entry("spacing_min").or_insert(f64::MAX.into());
         let case = Case::from_parts(&table.to_string(), facets)?;
         let cell = is_known.then(|| case.root.edge_of(case.level_surface));
-        Ok(Self { case, cell })
+        let rays = vec![case.keep == Keep::Inside];
+        Ok(Self { case, are_seeds_beyond: None, rays, cell })
+    }
+
+    /// Whether the mesh has leaves within the body, or outside of it: by what the case keeps or, if it has seeds, by their rays.
+    pub fn is_meshed(&self, is_inside: bool) -> bool {
+        self.case.keep == Keep::All || self.rays.contains(&is_inside)
     }
 
     /// Edge length of the finest cells at a surface in a region of the user's units: those of the boxes that meet it, if they are finer.
@@ -122,7 +145,6 @@ const FACETS_MAX: usize = (1 << 31) / 3;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::manifest::Keep;
 
     const FACET: Facet = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::iter::repeat_n;
 
 /// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or is back to back in
-/// one plane. Neither makes two volumes overlap.
+/// one plane. Neither makes two volumes overlap, but the latter is a wall, which matters if the inside is meshed.
 const ROUNDING: f64 = 2.0;
 
 /// The search ends when it has found this number of pairs.
@@ -43,7 +43,8 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
     let is_rounding = |&(f, g): &(u32, u32)| {
         let agree = shells.outward(f).zip(shells.outward(g)).map(|(f, g)| f == g);
         let is_opposite = agree.map(|agree| agree == (dot(normal(facet(f)), normal(facet(g))) < 0));
-        depth((facet(f), facet(g)), is_opposite == Some(true)) <= ROUNDING
+        let is_shifted = is_opposite == Some(true) && !input.is_meshed(true);
+        input.are_seeds_beyond == Some(true) || depth((facet(f), facet(g)), is_shifted) <= ROUNDING
     };
     pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
     Finding {
@@ -170,7 +171,7 @@ mod tests {
         let facets = vec![plane, across, [r, q, p]];
         let input = Input::new(facets, Requested::default()).unwrap();
         let lattice = &input.case.facets_lattice;
-        let shells = Shells::new(&Edges::new(&input.case.facets), lattice);
+        let shells = Shells::new(&Edges::new(&input.case.facets, lattice), lattice);
         let mut tree = FacetTree::new(lattice);
         let found = |tree: &FacetTree| {
             let finding = intersections(&input, tree, &shells, 5);

@@ -27,10 +27,10 @@ use tree::FacetTree;
 
 /// Diagnoses a geometry and lists the first places of each finding. The counts do not depend on the order of the facets or of a facet's vertices.
 pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
-    let edges = Edges::new(&input.case.facets);
+    let edges = Edges::new(&input.case.facets, &input.case.facets_lattice);
     let shells = Shells::new(&edges, &input.case.facets_lattice);
     let mut findings = vec![openings::openings(input, &edges, first)];
-    findings.extend(edges::findings(input, &edges, first));
+    findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
     findings.push(edges::stray(input, &tree, first));
@@ -44,7 +44,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     }
     findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
-        if finding.kind.changes_region(input.case.keep) {
+        if finding.kind.changes_region(input) {
             finding.count_changing = finding.count;
         }
         finding.meaning = finding::meaning(finding, input);

@@ -28,7 +28,7 @@ pub struct Shells {
     pub count: u64,
     /// Number of closed shells.
     pub closed: u64,
-    /// Number of their facets: all but those with a repeated vertex.
+    /// Number of their facets: all but those with a repeated vertex, and slivers that are left out of the edges.
     pub facets: u64,
 }
 

@@ -1,14 +1,15 @@
 //! Shells: components of facets that are connected by shared edges.
 
 use contract::lattice::{FacetLattice, dot, normal};
-use contract::manifest::Keep;
+use contract::manifest::Enclosed;
 use contract::parity::Parity;
 use contract::sets::Sets;
+use parry3d_f64::bounding_volume::BoundingVolume as _;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::tree::{Aabb, Point};
+use super::tree::{Aabb, triangle};
 use std::collections::HashMap;
 
 /// A shell.
@@ -21,20 +22,15 @@ pub struct Shell {
     is_oriented: bool,
     /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
     volume_sixfold: i128,
-    /// Whether it is closed and lies in an odd number of other closed shells, so that its interior is outside.
+    /// Whether it is closed and lies in an odd number of other shells, by all rays, so that its interior is outside.
     is_nested: bool,
+    /// Whether it is wound the other way than the nearest shell around it.
+    is_cavity: bool,
     /// On the lattice, whose coordinates are exact in f64.
     bounds: Aabb,
 }
 
 impl Shell {
-    fn add(&mut self, facet: &FacetLattice) {
-        self.volume_sixfold += dot(facet[0], normal(facet));
-        for vertex in facet {
-            self.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
-        }
-    }
-
     /// Whether the bounding box lies in the interior of that of the other shell.
     fn may_be_in(&self, other: &Self) -> bool {
         let (inner, outer) = (self.bounds, other.bounds);
@@ -46,7 +42,7 @@ impl Shell {
 pub struct Shells {
     /// All shells, in the order of their first facets.
     pub all: Vec<Shell>,
-    /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
+    /// The index of every facet's shell; [`u32::MAX`] for a facet without edges, which belongs to none.
     pub of: Vec<u32>,
 }
 
@@ -59,10 +55,7 @@ impl Shells {
         }
         let mut all: Vec<Shell> = Vec::new();
         let mut of = vec![u32::MAX; edges.corners.len()];
-        for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
-            if a == b || b == c || c == a {
-                continue;
-            }
+        for (facet, _) in edges.corners.iter().enumerate().filter(|(_, ends)| ends.is_some()) {
             // The representative is the lowest facet, so its shell exists before those of its other facets.
             let first = sets.root(facet as u32);
             if first as usize == facet {
@@ -73,11 +66,14 @@ impl Shells {
                     is_oriented: true,
                     volume_sixfold: 0,
                     is_nested: false,
+                    is_cavity: false,
                     bounds: Aabb::new_invalid(),
                 });
             }
             of[facet] = of[first as usize];
-            all[of[facet] as usize].add(&lattice[facet]);
+            let shell = &mut all[of[facet] as usize];
+            shell.volume_sixfold += dot(lattice[facet][0], normal(&lattice[facet]));
+            shell.bounds.merge(&triangle(&lattice[facet]).local_aabb());
         }
         for uses in edges.iter() {
             let shell = &mut all[of[uses[0].facet as usize] as usize];
@@ -96,9 +92,13 @@ impl Shells {
                 let interior = interiors.entry(*other).or_insert_with(|| Parity::new(&own[*other]));
                 interior.inside(corner) == [true; 6]
             };
-            let may_be_in = |other: &&usize| all[index].may_be_in(&all[**other]);
-            let around = closed.iter().filter(may_be_in).filter(|other| contains(other)).count();
-            all[index].is_nested = around % 2 == 1;
+            let may_be_in = |other: &usize| all[index].may_be_in(&all[*other]);
+            // Not only closed ones: edges at T-junctions and narrow holes are open, too.
+            let around = (0..all.len()).filter(may_be_in).filter(|other| contains(other));
+            let around: Vec<i128> = around.map(|other| all[other].volume_sixfold).collect();
+            all[index].is_nested = around.len() % 2 == 1;
+            let nearest = around.into_iter().min_by_key(|volume| volume.abs()).unwrap_or(1);
+            all[index].is_cavity = (nearest < 0) != (all[index].volume_sixfold < 0);
         }
         Self { all, of }
     }
@@ -117,7 +117,7 @@ impl Shells {
         a != b && p.is_closed && q.is_closed && !p.may_be_in(q) && !q.may_be_in(p)
     }
 
-    /// Closed shells that are inside out, and those that lie in an odd number of other closed ones.
+    /// Closed shells that are inside out, and those that lie in an odd number of others.
     pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
         let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
         for shell in &self.all {
@@ -126,7 +126,11 @@ impl Shells {
                 continue;
             }
             let at = usize::from(shell.is_nested);
-            let changes = !is_wound_inward && input.case.keep != Keep::Outside;
+            // A solid in a solid is a space, which is meshed with what is around it, with enclosed space, or from a seed in it.
+            let is_enclosed_kept = input.case.enclosed == Enclosed::Keep;
+            let is_kept = input.are_seeds_beyond.map_or(is_enclosed_kept, |are_beyond| !are_beyond);
+            let is_space = shell.is_nested && !(shell.is_oriented && shell.is_cavity);
+            let changes = is_space && (is_kept || input.is_meshed(true));
             findings[at].count_changing += u64::from(changes);
             let facet = shell.facet_first;
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));

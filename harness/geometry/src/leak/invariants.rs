@@ -5,6 +5,7 @@
 //!   closed.
 //! - Every leg lies in a free leaf; or, in a leaf that facets cross, a ball of the least width passes along it.
 //! - No facet is nearer to a leg that counts than half of the least width, and none meets any leg.
+//! - A path of a coarser base tree than the case's is so wide that this tree has free leaves on every wider one.
 //! - The narrowest place is a point of the path; its width lies between its bounds, is no more than that of any point that counts, and is
 //!   twice the distance to the nearest facet, which is one of the rim.
 
@@ -55,8 +56,16 @@ impl Passage {
         assert!(is_start && is_end, "the path leads from {} to {end}", points[0]);
         let (first, last) = self.inner;
         assert!(first <= last && last < points.len(), "{:?} of {}", self.inner, points.len());
+        let is_widest = self.spacing.level == case.level_surface || self.is_widest();
+        assert!(is_widest, "cells of {:?} may close a wider path", self.spacing);
         self.check_legs(case, words, &points, self.narrowest.width_min / 2.0 * scale);
         self.check_narrowest(case, lattice(self.narrowest.at), scale);
+    }
+
+    /// Whether no base tree of a finer spacing has a wider path: an opening wider than the diagonals of two cells is open at their spacing. An
+    /// end may be narrower, as no opening is.
+    pub fn is_widest(&self) -> bool {
+        self.narrowest.is_end || self.narrowest.width_max >= 12f64.sqrt() * self.spacing.spacing
     }
 
     /// Compares the legs with all facets; `least` is the clearance of those that count.
@@ -104,6 +113,7 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use super::super::Leaks;
+    use super::super::report::Spacing;
     use super::*;
     use contract::failure::Failure;
     use contract::failure::Watch;
@@ -151,7 +161,7 @@ mod tests {
             p.points.push(end);
             (p.inner.1, p.narrowest.index) = (p.points.len() - 1, p.inner.0);
         };
-        let plants: [Plant; 9] = [
+        let plants: [Plant; 10] = [
             ("a point outside the root", &|p| p.points[1].at[0] = 1398.0),
             ("another start", &|p| p.points[0].at[1] += 0.1),
             ("an end off the boundary", &|p| p.points.truncate(p.points.len() - 1)),
@@ -164,6 +174,7 @@ mod tests {
             ("a width above its bound", &|p| p.narrowest.width_max = 0.9 * p.narrowest.width),
             ("a width below its bound", &|p| p.narrowest.width_min = 1.1 * p.narrowest.width),
             ("another narrowest place", &|p| p.narrowest.index -= 1),
+            ("cells that may close a wider path", &|p| p.spacing = Spacing::of(1, &case.root)),
             ("facets far from the rim", &|p| p.narrowest.facets = vec![300]),
         ];
         for (what, plant) in plants {

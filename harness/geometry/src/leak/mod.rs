@@ -93,38 +93,43 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             return Err(Failure::input(why_crossed(what, at, &self.trees[&level], root)));
         }
         let spacing = Spacing::of(level, root);
-        let (is_leak, outside) = self.leaks(level, ends)?;
+        let (widest, outside) = self.leaks(level, ends)?;
+        let (is_leak, closes, passage) = (widest.is_some(), None, None);
         let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
         let is_enclosed = !is_leak && to == Target::Far && is_outside && self.case.seeds.is_empty();
-        let (closes, passage) = (None, None);
         let mut report = Report { from, to, spacing, is_leak, is_enclosed, closes, passage };
-        if is_leak {
-            // A leaf of the level that joins the ends is free, so the opening is at least as wide, or 4 times the leaves two levels
-            // below. There the widest ball's centre lies in free leaves: no finer tree has a wider path.
-            const DEEPER: u8 = 2;
-            report.closes = self.coarsen(ends, outside)?;
-            let open = report.closes.map_or(0, |closes| closes.spacing.level + 1);
-            let measured = level.min(open + DEEPER);
-            self.watch.step("measuring the width");
-            let outside = outside.map(|level| &self.trees[&level][..]);
-            let words = &self.trees[&measured];
-            let space = Space::new(words, &self.facets, outside)?;
-            let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
-            passage.check_invariants(self.case, (words, outside), (from, to));
-            // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
-            let cell = passage.narrowest.cell_of_boxes;
-            report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
-            report.passage = Some(passage);
+        if let Some(finest) = widest {
+            // The widest opening is as wide as the leaves of a path, or 4 times those two levels below. There its ball's centre lies in
+            // free leaves: no finer tree has a wider path. The coarsest tree that joins the ends may do so through the finer cells of a
+            // box, and close a wider opening.
+            report.closes = self.coarsen(ends, outside, finest)?;
+            for measured in level.min(finest + 2)..=level {
+                self.make_tree(measured)?;
+                self.watch.step("measuring the width");
+                let outside = outside.map(|level| &self.trees[&level][..]);
+                let words = &self.trees[&measured];
+                let space = Space::new(words, &self.facets, outside)?;
+                let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
+                // Otherwise, a narrow place at the start, which no opening is, may hide a wider path.
+                if measured == level || passage.is_widest() {
+                    passage.check_invariants(self.case, (words, outside), (from, to));
+                    // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
+                    let cell = passage.narrowest.cell_of_boxes;
+                    report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
+                    report.passage = Some(passage);
+                    break;
+                }
+            }
         }
         Ok(report)
     }
 
-    /// Whether free leaves of a base tree join the ends, which lie in some; and the level whose outside is the far field, if that is not all of
-    /// the root's boundary.
-    fn leaks(&mut self, level: u8, ends: Ends) -> Result<(bool, Option<u8>)> {
-        let is_joined = self.search(level, ends, None)?;
-        let outside = if is_joined && ends.1.is_none() { self.closed(ends.0)? } else { None };
-        Ok((is_joined && (outside.is_none() || self.search(level, ends, outside)?), outside))
+    /// What [`Self::search`] finds in a base tree; and the level whose outside is the far field, if that is not all of the root's boundary.
+    fn leaks(&mut self, level: u8, ends: Ends) -> Result<(Option<u8>, Option<u8>)> {
+        let joined = self.search(level, ends, None)?;
+        let is_far = joined.is_some() && ends.1.is_none();
+        let outside = if is_far { self.closed(ends.0)? } else { None };
+        Ok((if outside.is_some() { self.search(level, ends, outside)? } else { joined }, outside))
     }
 
     fn make_tree(&mut self, level: u8) -> Result<()> {
@@ -156,25 +161,29 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         Ok(None)
     }
 
-    /// Whether free leaves of a base tree join the ends, which lie in some. The far field is what is `outside` at that level, if there is one.
-    /// The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<bool> {
+    /// The level of the finest leaves on the path that joins the ends through the coarsest free leaves of a base tree; none if no path does.
+    /// The ends lie in free leaves. The far field is what is `outside` at that level, if there is one.
+    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<Option<u8>> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let outside = outside.map(|level| &self.trees[&level][..]);
         let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
-        Ok(space.widest(ends, f32::INFINITY, edge, self.watch)?.is_some())
+        let widest = space.widest(ends, f32::INFINITY, edge, self.watch)?;
+        Ok(widest.map(|(_, edge)| (UNITS_PER_EDGE as f32 / edge).log2() as u8))
     }
 
-    /// Coarsens the surface until the ends are not joined.
-    fn coarsen(&mut self, ends: Ends, outside: Option<u8>) -> Result<Option<Closes>> {
+    /// Coarsens the surface until the ends are not joined; at the case's spacing, leaves of the level `finest` or coarser join them. If facets
+    /// then cross only the leaves of the ends, and finer ones joined them before, those of a box, no spacing closes the opening.
+    fn coarsen(&mut self, ends: Ends, far: Option<u8>, mut finest: u8) -> Result<Option<Closes>> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let is_end_crossed = self.crossed(level, ends).is_some();
-            if is_end_crossed || !self.search(level, ends, outside)? {
-                let spacing = Spacing::of(level, &self.case.root);
-                return Ok(Some(Closes { spacing, is_end_crossed }));
-            }
+            let joined = if is_end_crossed { None } else { self.search(level, ends, far)? };
+            let Some(leaves) = joined else {
+                let at = Closes { spacing: Spacing::of(level, &self.case.root), is_end_crossed };
+                return Ok((!is_end_crossed || finest <= level + 1).then_some(at));
+            };
+            finest = leaves;
         }
         Ok(None)
     }
@@ -218,7 +227,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             let Ok(at) = on_lattice("--from", place, &root) else { continue };
             // A search from the smaller of two places ends sooner: that of a leak, not that of a flow.
             let ends = end.map_or((at, None), |end| (end, Some(at)));
-            if self.crossed(level, ends).is_none() && self.leaks(level, ends)?.0 {
+            if self.crossed(level, ends).is_none() && self.leaks(level, ends)?.0.is_some() {
                 return Ok(Some(place));
             }
         }

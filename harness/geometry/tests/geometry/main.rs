@@ -152,6 +152,92 @@ fn a_repeated_facet_is_a_duplicate_in_any_order_of_its_vertices() {
     assert!(found.changes_region);
 }
 
+/// A case with these facets in a root that all of them lie in.
+fn case(facets: &[Facet], rules: &str) -> Diagnosis {
+    let dir = tempfile::tempdir().unwrap();
+    let vertex = |[x, y, z]: &[f32; 3]| format!("vertex {x} {y} {z}\n");
+    let facet = |f: &Facet| {
+        let corners = f.iter().map(vertex).collect::<String>();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    let text = facets.iter().map(facet).collect::<String>();
+    std::fs::write(dir.path().join("body.stl"), format!("solid\n{text}endsolid\n")).unwrap();
+    let root = "root = { origin = [-16.0, -16.0, -16.0], edge = 32.0 }";
+    let text = format!("geometry = 'body.stl'\nspacing_min = 0.25\n{root}\n{rules}\n");
+    std::fs::write(dir.path().join("case.toml"), text).unwrap();
+    diagnose(&Input::read(&dir.path().join("case.toml"), Requested::default()).unwrap(), 5)
+}
+
+/// Equal facets, or others in one plane, back to back, are a wall in the flow through both solids. A solid in a solid is a space.
+#[test]
+fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
+    let seeds = |within: bool| format!("seeds = [[{}, 3.5, 3.5]]", if within { 0.5 } else { -9.0 });
+    let [within, beyond] = [true, false].map(seeds);
+    let rules = [
+        ("", false),
+        ("keep_crossing = false", false),
+        ("keep = 'inside'", true),
+        ("keep = 'all'", true),
+        (&within, true),
+        (&beyond, false),
+        (&format!("keep = 'inside'\n{within}"), true),
+        (&format!("keep = 'inside'\n{beyond}"), false),
+        (&format!("keep = 'all'\n{beyond}"), true),
+    ];
+    let equal = cuboid([4.0, 0.0, 0.0], [8.0, 4.0, 4.0]);
+    let other = cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0]);
+    for (second, kind, effects) in [
+        (equal, Kind::Duplicates, 2),
+        (other, Kind::Intersections, 2),
+        (cuboid([1.0; 3], [3.0; 3]), Kind::Nested, 1),
+    ] {
+        for (rules, has_effect) in rules {
+            let found = case(&[cube(), second.clone()].concat(), rules);
+            let changing = found.finding(kind).unwrap().count_changing;
+            assert_eq!(changing, if has_effect { effects } else { 0 }, "{rules}: {found}");
+        }
+    }
+    let nested = [cube(), cuboid([1.0; 3], [3.0; 3])].concat();
+    assert!(case(&nested, "enclosed = 'keep'").changes_region);
+    // A vertex on an edge and a narrow hole open the edges of the shell around it.
+    let [a, b, c] = nested[0];
+    let [middle, off] = [0.0, 0.01].map(|by| [0, 1, 2].map(|x| (b[x] + c[x]) / 2.0 + by));
+    for middle in [middle, off] {
+        let parts = vec![[a, b, middle], [a, middle, c]];
+        let found = case(&[&nested[1..], &parts].concat(), "keep = 'inside'");
+        assert_eq!((found.shells.closed, count(&found, Kind::Nested)), (1, 1), "{found}");
+        assert!(found.changes_region);
+    }
+    // Both solids inside out are the same; one of them alone makes the inner one a cavity.
+    let reversed = |i: usize, facet: &Facet, at: &[usize]| {
+        let [a, b, c] = *facet;
+        if at.contains(&(i / 12)) { [c, b, a] } else { [a, b, c] }
+    };
+    for (at, is_solid) in [(&[0, 1][..], true), (&[0], false), (&[1], false)] {
+        let facets: Vec<_> = nested.iter().enumerate().map(|(i, f)| reversed(i, f, at)).collect();
+        assert_eq!(case(&facets, "keep = 'inside'").changes_region, is_solid);
+    }
+    assert!(case(&nested, "seeds = [[2.0, 2.0, 2.0]]").changes_region);
+    assert!(!case(&nested, &format!("enclosed = 'keep'\n{beyond}")).changes_region);
+    // Where the rays of seeds are not counted, copies and overlaps do not matter to a flow beyond the body.
+    let overlapping = [cube(), cube()[..3].to_vec(), cuboid([3.0; 3], [7.0; 3])].concat();
+    for (rules, has_effect) in [("", true), (&within, true), (&beyond, false)] {
+        let found = case(&overlapping, rules);
+        let kinds = [Kind::NonManifoldOdd, Kind::Duplicates, Kind::Intersections];
+        assert!(kinds.iter().all(|&kind| count(&found, kind) > 0), "{found}");
+        assert_eq!(found.changes_region, has_effect, "{rules}: {found}");
+        assert_eq!(found.to_string().contains("all of them lie beyond the body"), !has_effect);
+    }
+    // Walls matter to a flow within the body, gaps to one around it, whatever side is kept by its name.
+    let plate = cuboid([0.0; 3], [4.0, 4.0, 0.125]);
+    let thin = [plate, cuboid([0.0, 0.0, 0.25], [4.0; 3])].concat();
+    for (rules, walls, gaps) in [(&beyond, 0, 4), (&within, 4, 0)] {
+        let found = case(&thin, &format!("keep = 'inside'\n{rules}"));
+        let changing = |kind| found.finding(kind).unwrap().count_changing;
+        assert_eq!((changing(Kind::ThinWalls), changing(Kind::ThinGaps)), (walls, gaps), "{found}");
+    }
+}
+
 /// As in assemblies: the copies are within the body, unless one of the solids is there twice, once inside out.
 #[test]
 fn solids_that_touch_in_equal_facets_do_not_change_the_region() {
@@ -375,12 +461,14 @@ fn facets_without_area_have_no_effect_unless_they_are_apart() {
         let found = diagnosis([cube(), vec![[from, to, to]]].concat(), Some(0.25));
         assert_eq!((count(&found, Kind::Stray), found.changes_region), (stray, stray > 0));
     }
-    // A sliver on an edge of the cube lies on its facets, too, and no ray meets it; but a fin at its middle has an odd number of them.
+    // A sliver on an edge of the cube lies on its facets, too, and no ray meets it, nor its copy, nor one at its own edge; but a fin at its
+    // middle has an odd number of facets.
     let (from, middle, to) = ([0.0, 0.0, 4.0], [2.0, 0.0, 4.0], [4.0, 0.0, 4.0]);
-    let mut facets = [cube(), vec![[from, middle, to]]].concat();
-    let found = diagnosis(facets.clone(), Some(0.25));
-    assert_eq!((count(&found, Kind::Stray), count(&found, Kind::NonManifoldOdd)), (0, 1));
-    assert!(!found.changes_region && found.to_string().contains("a sliver without area"));
+    let sliver = [from, middle, to];
+    let mut facets = [cube(), vec![sliver]].concat();
+    for more in [&[][..], &[sliver], &[[from, [1.0, 0.0, 4.0], middle]]] {
+        assert_eq!(counts(&diagnosis([&facets[..], more].concat(), Some(0.25))), []);
+    }
     facets.push([middle, to, [9.0; 3]]);
     assert_eq!(diagnosis(facets, None).finding(Kind::NonManifoldOdd).unwrap().count_changing, 1);
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));

@@ -4,7 +4,7 @@ mod openings;
 
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result, Watch};
-use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::lattice::Root;
 use contract::octant::Octant;
 use contract::testing::{assert_text, base_tree};
 use geometries::{Generator, Shape};
@@ -192,51 +192,48 @@ fn the_answer_is_the_expected_text() {
     assert_text(&all.map(one).concat(), "tests/leak/expected.txt");
 }
 
-/// Of the leaves that facets cross, only those of the box are opened: wide balls would seem to pass the wall in the others.
-#[test]
-fn an_opening_in_a_finer_box_is_measured_and_no_spacing_closes_it() {
-    let body = hole(0.05);
-    let case = case(&body.facets, 5);
-    let units = |at: f64, axis: usize| {
-        ((at - ROOT.origin[axis]) / ROOT.edge * UNITS_PER_EDGE as f64) as i64
-    };
-    let [low, high] =
-        [-0.2, 0.2].map(|by| [units(0.13 + by, 0), units(-0.21 + by, 1), units(1.0 + by, 2)]);
-    let is_in_box = |octant: &Octant| {
-        let (begin, end) = octant.bounds();
-        (0..3).all(|a| begin[a] < high[a] && low[a] < end[a])
-    };
-    let tree = |level| {
-        let level = |octant: &Octant| if is_in_box(octant) { 10 } else { level };
-        Ok(base_tree(&case.facets_lattice, level))
-    };
-    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
-    let answers = leaks.answers(&[([0.13, -0.21, 0.9], Target::Far)]).unwrap();
-    let report = &answers.examined[0];
-    assert!(report.is_leak && report.closes.is_none(), "{report}");
-    assert!(!report.to_string().contains("Spacings above"), "{report}");
-    assert_describes(report, &body, "a box");
-}
-
-/// A box of cells that pass through the opening keeps it open at every spacing, also where coarser cells would be crossed at the ends.
-#[test]
-fn no_spacing_closes_an_opening_in_a_finer_box() {
-    let body = hole(0.05);
+/// The answer for a case with a box, at the surface level of the root's 1/32.
+fn in_box(
+    facets: &[Facet],
+    from: [f64; 3],
+    (low, high): ([f64; 3], [f64; 3]),
+    spacing: f64,
+) -> Report {
     let Root { origin, edge } = ROOT;
     let text = format!(
         "spacing_min = 0.25\n[root]\norigin = {origin:?}\nedge = {edge:?}\n\
-         [[box]]\nmin = [-0.07, -0.41, 0.8]\nmax = [0.33, -0.01, 1.2]\nspacing = 0.0078125"
+         [[box]]\nmin = {low:?}\nmax = {high:?}\nspacing = {spacing}"
     );
-    let case = Case::from_parts(&text, body.facets.clone()).unwrap();
+    let case = Case::from_parts(&text, facets.to_vec()).unwrap();
     let tree = |level| {
-        let level = |octant: &Octant| {
-            if case.boxes[0].meets(octant) { case.boxes[0].level } else { level }
-        };
+        let fine = case.boxes[0].level.max(level);
+        let level = |octant: &Octant| if case.boxes[0].meets(octant) { fine } else { level };
         Ok(base_tree(&case.facets_lattice, level))
     };
     let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
-    let report = leaks.answers(&[([0.0; 3], Target::Far)]).unwrap().examined.remove(0);
-    assert!(report.is_leak && report.closes.is_none(), "{report}");
+    leaks.answers(&[(from, Target::Far)]).unwrap().examined.remove(0)
+}
+
+/// Of the leaves that facets cross, only those of the box are opened: wide balls would seem to pass the wall in the others. A box of cells
+/// that pass through the opening keeps it open at every spacing, also where coarser cells would be crossed at the ends.
+#[test]
+fn an_opening_in_a_finer_box_is_measured_and_no_spacing_closes_it() {
+    let body = hole(0.05);
+    let around = ([-0.07, -0.41, 0.8], [0.33, -0.01, 1.2]);
+    for start in [[0.0; 3], [0.13, -0.21, 0.9]] {
+        let report = in_box(&body.facets, start, around, 0.0078125);
+        assert!(report.is_leak && report.closes.is_none(), "{report}");
+        assert!(!report.to_string().contains("Spacings above"), "{report}");
+        assert_describes(&report, &body, "a box");
+    }
+}
+
+/// The cells of the box join the ends at every spacing, through an opening that is not the widest.
+#[test]
+fn the_widest_opening_is_reported_also_if_a_narrower_one_lies_in_a_finer_box() {
+    let body = two_holes(0.45, 0.1);
+    let around = ([-0.6, -0.6, -1.2], [0.6, 0.6, 0.6]);
+    let report = in_box(&body.facets, [0.0; 3], around, 0.03125);
     assert_describes(&report, &body, "a box");
 }
 
