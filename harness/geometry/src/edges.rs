@@ -70,20 +70,34 @@ impl Edges {
                 uses.push(Use { ends: sorted(ends), facet, is_down: ends[0] > ends[1] });
             }
         }
-        uses.sort_unstable();
-        let mut edges = Self { corners, points, uses };
-        // A sliver that is left out leaves edges to others.
-        loop {
-            let alone = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0].facet);
-            let mut edges_alone: HashMap<u32, u32> = HashMap::new();
-            alone.filter(|f| is_sliver(*f)).for_each(|f| *edges_alone.entry(f).or_default() += 1);
-            edges_alone.retain(|_, count| *count > 1);
-            if edges_alone.is_empty() {
-                return edges;
-            }
-            edges_alone.keys().for_each(|facet| edges.corners[*facet as usize] = None);
-            edges.uses.retain(|one| !edges_alone.contains_key(&one.facet));
+        let all = 0..facets.len() as u32;
+        let mut queue: Vec<u32> = all.filter(|facet| is_sliver(*facet)).collect();
+        // At the edges of slivers: the number of facets, and the exclusive or of their numbers, which is the last one of them.
+        let mut left: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
+        for one in uses.iter().filter(|one| is_sliver(one.facet)) {
+            left.insert(one.ends, (0, 0));
         }
+        for one in &uses {
+            let of_sliver = left.entry(one.ends);
+            of_sliver.and_modify(|(count, of)| (*count, *of) = (*count + 1, *of ^ one.facet));
+        }
+        // A sliver that is left out leaves edges to others.
+        while let Some(facet) = queue.pop() {
+            let Some(at) = corners[facet as usize] else { continue };
+            let ends = lattice::edges(&at).map(sorted);
+            if ends.iter().filter(|ends| left[*ends].0 == 1).count() < 2 {
+                continue;
+            }
+            corners[facet as usize] = None;
+            for ends in ends {
+                let (count, of) = left[&ends];
+                left.insert(ends, (count - 1, of ^ facet));
+                queue.extend(Some(of ^ facet).filter(|other| count == 2 && is_sliver(*other)));
+            }
+        }
+        uses.retain(|one| corners[one.facet as usize].is_some());
+        uses.sort_unstable();
+        Self { corners, points, uses }
     }
 
     /// The facets at every edge.
