@@ -274,6 +274,20 @@ class CellsTest(unittest.TestCase):
         why = self.refused(self.edited("foam-ascii", "neighbour", lengthen))
         self.assertIn("960 faces with 960 owners and 961 neighbours: its files belong to different meshes", why)
 
+    def test_a_cell_that_lacks_a_face_is_refused(self):
+        """A face at a low side of a cell is one that only `neighbour` gives it, and any part of that list may be lost."""
+
+        def shorten(count):
+            def change(content):
+                head, _, rest = content.partition(b"\n720\n(")
+                return head + b"\n%d\n(" % count + b" ".join(rest.split(b")")[0].split()[:count]) + b")"
+
+            return self.edited("foam-ascii", "neighbour", change)
+
+        self.assertEqual(len(read(shorten(720))[1]), 256)
+        for count in (719, 700, 360, 1, 0):
+            self.assertRegex(self.refused(shorten(count)), r"cell \d+ .* is not a cube: its faces, with 0\.\d+ of a cube's area, do not close it")
+
     def test_cells_of_discretize_have_whole_numbers_within_the_mesh(self):
         def changed(change):
             mesh = json.loads((samples() / "cube.json").read_text())
