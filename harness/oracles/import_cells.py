@@ -77,6 +77,8 @@ def csv(path, request):
     try:
         columns = np.loadtxt(cells, ndmin=2, comments=None).T
     except ValueError as why:
+        # NumPy goes on with remedies of its own.
+        why = str(why).partition("; use")[0]
         raise Refused(f"is no table of numbers: {why} (comments and the names of columns do not count)") from None
     if is_named and len(names) != len(columns):
         raise Refused(f"has {len(columns)} fields in a line, but {len(names)} names of columns")
