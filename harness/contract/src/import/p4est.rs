@@ -62,10 +62,9 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
         let tree = Root { origin, edge: trees.edges[tree] * scale };
         add_tree(quadrants, length, &tree, &mut cells)?;
     }
-    let (count, is_any) = (cells.count(), |sides: &Vec<_>| !sides.is_empty());
-    cells.sides = cells.sides.filter(is_any);
-    let why = damaged("only some of its leaves have a side");
-    Failure::unless(cells.sides.as_ref().is_none_or(|sides| sides.len() == count), why)?;
+    cells.sides = cells.sides.filter(|sides| !sides.is_empty());
+    let is_whole = cells.sides.as_ref().is_none_or(|sides| sides.len() == cells.edges.len());
+    Failure::unless(is_whole, damaged("only some of its leaves have a side"))?;
     Ok(cells)
 }
 
