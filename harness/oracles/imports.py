@@ -56,6 +56,12 @@ def run(read):
         print("needs more memory than the machine has: it is damaged or too large", file=sys.stderr)
         raise SystemExit(2) from None
     columns = [column for column in (more.get("levels"), more.get("sides")) if column is not None]
-    np.column_stack([corners, edges, *columns]).astype("<f8").tofile(sys.argv[2])
+    try:
+        # NumPy's `tofile` does not notice that the end was not written.
+        with open(sys.argv[2], "wb") as file:
+            file.write(np.column_stack([corners, edges, *columns]).astype("<f8"))
+    except OSError as error:
+        print(f"was read, but its cells cannot be written to a temporary file: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
     known = {f"has_{name}": more.get(name) is not None for name in ("levels", "sides")}
     print(json.dumps({"root": more.get("root"), "digest": more.get("digest"), **known}))

@@ -145,9 +145,7 @@ class FoamTest(unittest.TestCase):
             self.assertLess(serial[-1], 1e-4)
 
 
-@needs("harness", "mesher")
-@unittest.skipUnless(shutil.which("potentialFoam"), "OpenFOAM is not installed: run ci/peers snappy")
-class RunTest(unittest.TestCase):
+class RunCase(unittest.TestCase):
     """The script `run`, with the programs of the tests."""
 
     def setUp(self):
@@ -162,9 +160,10 @@ class RunTest(unittest.TestCase):
             "[root]\norigin = [-2, -2, -2]\nedge = 4\n"
         )
 
-    def start(self, *arguments, environment=None):
-        environment = ENVIRONMENT | {"CARGO_TARGET_DIR": str(self.at / "target")} | (environment or {})
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    def start(self, *arguments, **pipes):
+        bin = {"PATH": f"{self.at}/bin:{os.environ['PATH']}"}
+        environment = ENVIRONMENT | {"CARGO_TARGET_DIR": str(self.at / "target")} | bin
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | pipes
         # A shell ignores for ever what was ignored when it began, as in jobs in the background.
         heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
         return subprocess.Popen([TEMPLATE.parent / "run", *arguments], cwd=self.at, env=environment, preexec_fn=heed, **pipes)
@@ -180,6 +179,10 @@ class RunTest(unittest.TestCase):
         self.assertIn(expected, error)
         self.assertFalse((self.at / "out").exists())
 
+
+@needs("harness", "mesher")
+@unittest.skipUnless(shutil.which("potentialFoam"), "OpenFOAM is not installed: run ci/peers snappy")
+class RunTest(RunCase):
     def test_a_flow_needs_an_inlet_and_an_outlet(self):
         """The root cuts the duct at yMin and yMax, and the template's inlet xMin has no face."""
         (self.at / "duct.toml").write_text(self.case)
@@ -206,16 +209,25 @@ class RunTest(unittest.TestCase):
         self.assertEqual({path.name for path in (self.at / "heat/case/0").iterdir()}, {"T"})
         self.assertGreater(np.ptp(values(self.at / "heat/case/1/T", "scalar", 1)), 0.1)
 
-    def test_a_solver_that_writes_nothing_has_not_solved(self):
-        (self.at / "duct.toml").write_text(self.case)
+
+@needs("harness", "mesher")
+class StandInTest(RunCase):
+    """Other programs in the place of OpenFOAM's."""
+
+    FLOW = ("duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMax")
+    # Writes a field as potentialFoam does.
+    SOLVES = """while [ "$1" != -case ]; do shift; done; echo 'internalField   nonuniform List<scalar> 1(x)' >"$2/0/Phi\""""
+
+    def setUp(self):
+        super().setUp()
         (self.at / "bin").mkdir()
-        idle = self.at / "bin/potentialFoam"
-        idle.write_text("#!/bin/sh\necho End\n")
-        idle.chmod(0o755)
-        process = self.start("duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMax", environment={"PATH": f"{self.at}/bin:{os.environ['PATH']}"})
-        _, error = process.communicate()
-        self.assertEqual(process.returncode, 1, error)
-        self.assertIn("wrote no 0/Phi", error)
+        (self.at / "duct.toml").write_text(self.case)
+        self.program("checkMesh", "echo Mesh OK.")
+        self.program("potentialFoam", "echo End")
+
+    def program(self, name, text):
+        (self.at / "bin" / name).write_text(f"#!/bin/sh\n{text}\n")
+        (self.at / "bin" / name).chmod(0o755)
 
     def test_crossing_cells_and_the_spacing_of_a_case_are_refused(self):
         (self.at / "duct.toml").write_text(self.case.replace("false", "true"))
@@ -226,17 +238,47 @@ class RunTest(unittest.TestCase):
         (self.at / "page.stl").write_text("<html></html>\n")
         self.refused("page.stl: is neither a binary STL nor a text STL", "page.stl", "1", "out")
 
+    def test_a_solver_that_writes_nothing_has_not_solved(self):
+        code, _, error = self.run_with(*self.FLOW)
+        self.assertEqual(code, 1, error)
+        self.assertIn("wrote no 0/Phi", error)
+
+    def test_a_solver_that_does_not_converge_has_not_solved(self):
+        residual = "GAMG:  Solving for Phi, Initial residual = 1, Final residual = {}, No Iterations {}"
+        good, slow, wrong = residual.format("8e-10", 9), residual.format(0.37, 1000), residual.format("-nan", 2)
+        logs = ((f"{good}\nContinuity error = 1e-9", 0), (slow, 1), (f"{slow}\n{good}", 1), (wrong, 1), (f"{good}\nContinuity error = nan", 1))
+        for log, expected in logs:
+            self.program("potentialFoam", f"echo '{log}'\n{self.SOLVES}")
+            shutil.rmtree(self.at / "out", ignore_errors=True)
+            code, _, error = self.run_with(*self.FLOW)
+            self.assertEqual(code, expected, log + error)
+            self.assertEqual("did not converge" in error, expected == 1, error)
+
+    def test_a_mesh_in_order_is_so_whoever_reads_the_output(self):
+        reads, writes = os.pipe()
+        self.program("checkMesh", f"cat {self.at}/closed; echo Mesh OK.")
+        os.mkfifo(self.at / "closed")
+        process = self.start(*self.FLOW, stdout=writes)
+        os.close(writes)
+        # checkMesh runs while there is still a reader, and ends when there is none.
+        with open(self.at / "closed", "w"):
+            os.close(reads)
+        _, error = process.communicate()
+        self.assertNotIn("found a fault", error)
+
+    def test_any_name_of_a_geometry_is_one_of_its_case(self):
+        for name in ('q"x.stl', "b\\t.stl", "n\n.stl", "a&'b.stl"):
+            shutil.copy(self.at / "duct.stl", self.at / name)
+            shutil.rmtree(self.at / "out", ignore_errors=True)
+            code, _, error = self.run_with(name, "0.5", "out", "--accept-leaks")
+            self.assertIn("wrote no 0/Phi", error)
+
     def test_a_signal_ends_the_program_that_is_running(self):
         """A program in place of checkMesh waits, so that the signal always arrives while it runs."""
-        (self.at / "duct.toml").write_text(self.case)
-        (self.at / "bin").mkdir()
-        wait = self.at / "bin/checkMesh"
-        wait.write_text(f"#!/bin/sh\necho $$ >{self.at}/pid.part\nmv {self.at}/pid.part {self.at}/pid\nexec sleep 60\n")
-        wait.chmod(0o755)
-        environment = {"PATH": f"{self.at}/bin:{os.environ['PATH']}"}
+        self.program("checkMesh", f"echo $$ >{self.at}/pid.part\nmv {self.at}/pid.part {self.at}/pid\nexec sleep 60")
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
             patches = ["--inlet", "yMin", "--outlet", "yMax"]
-            process = self.start("duct.toml", "-", f"out{code}", *patches, environment=environment)
+            process = self.start("duct.toml", "-", f"out{code}", *patches)
             while not (self.at / "pid").exists():
                 self.assertIsNone(process.poll())
                 time.sleep(0.01)

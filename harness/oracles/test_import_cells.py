@@ -5,7 +5,10 @@ import itertools
 import json
 import pathlib
 import random
+import resource
 import shutil
+import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -182,7 +185,7 @@ class CellsTest(unittest.TestCase):
             "0;0;0;,5": "has decimal commas or several separators in line 1",
             "x,y,z,level,Level\n0,0,0,1,2": "has more than one column level",
             "0 0 0 one\n": "no table of numbers",
-            "0 0 0 1\n0 0 0\n": "no table of numbers",
+            "0 0 0 1\n0 0 0\n": "no table of numbers: the number of columns changed from 4 to 3 at row 2 (comments",
             "x,y,z,level,side\n0,0,0,1\n": "4 fields in a line, but 5 names",
             "0 0 0 0.5": "cell 0 has the level 0.5",
             "0 0 0 1\n0 0 0 20": "cell 1 has the level 20",
@@ -195,6 +198,15 @@ class CellsTest(unittest.TestCase):
             self.assertIn("has a column level, which needs a root", self.refused(self.table(table)))
         self.assertIn("need a column level", self.refused(self.table("x,y,z,edge\n0,0,0,1"), position="index"))
         self.assertIn("has no column body", self.refused(self.table("0 0 0 1"), root=root, sides="body"))
+
+    def test_cells_that_cannot_be_written_are_no_fault_of_the_file(self):
+        request = json.dumps({"format": "table", "sides": None, "root": root_of([0, 0, 0, 1]), "position": "corner"})
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+        for cells, environment in ((self.at / "absent/cells", {}), (self.at / "cells", {"preexec_fn": limit})):
+            command = [sys.executable, "-B", import_cells.__file__, self.table("0 0 0 0"), cells, request]
+            done = subprocess.run(command, capture_output=True, text=True, **environment)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn("was read, but its cells cannot be written to a temporary file", done.stderr)
 
     def test_sides_of_an_openfoam_mesh_are_a_list_of_labels(self):
         copy = self.edited("foam-ascii", "cellLevel", lambda content: content)
@@ -273,6 +285,20 @@ class CellsTest(unittest.TestCase):
 
         why = self.refused(self.edited("foam-ascii", "neighbour", lengthen))
         self.assertIn("960 faces with 960 owners and 961 neighbours: its files belong to different meshes", why)
+
+    def test_a_cell_that_lacks_a_face_is_refused(self):
+        """A face at a low side of a cell is one that only `neighbour` gives it, and any part of that list may be lost."""
+
+        def shorten(count):
+            def change(content):
+                head, _, rest = content.partition(b"\n720\n(")
+                return head + b"\n%d\n(" % count + b" ".join(rest.split(b")")[0].split()[:count]) + b")"
+
+            return self.edited("foam-ascii", "neighbour", change)
+
+        self.assertEqual(len(read(shorten(720))[1]), 256)
+        for count in (719, 700, 360, 1, 0):
+            self.assertRegex(self.refused(shorten(count)), r"cell \d+ .* is not a cube: its faces, with 0\.\d+ of a cube's area, do not close it")
 
     def test_cells_of_discretize_have_whole_numbers_within_the_mesh(self):
         def changed(change):

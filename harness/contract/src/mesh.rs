@@ -159,6 +159,10 @@ impl Mesh {
             }
             Ok(())
         })?;
+        self.require_digest(digest)
+    }
+
+    fn require_digest(&self, digest: Digest) -> Result<()> {
         let stated = self.manifest.digest;
         let why = format!(
             "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
@@ -169,10 +173,11 @@ impl Mesh {
     /// All leaves as a tree.
     ///
     /// # Errors
-    /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
+    /// As [`Mesh::leaves`], and if the tree has more distinct nodes than [`NODES_MAX`].
     pub fn tree(&self) -> Result<Tree> {
-        let mut builder = Builder::default();
+        let (mut builder, mut digest) = (Builder::default(), Digest::default());
         self.visit(&mut |_, blocks| {
+            blocks.iter().for_each(|block| digest.add_block(block));
             if builder.nodes() <= NODES_MAX {
                 blocks.iter().for_each(|b| builder.push_block(b).expect("a visit is linear"));
             }
@@ -181,6 +186,7 @@ impl Mesh {
         let why = "distinct octants, which is the limit: use a part of the mesh";
         let why = Failure::about(&self.dir, format!("more than {NODES_MAX} {why}"));
         Failure::unless(builder.nodes() <= NODES_MAX, why)?;
+        self.require_digest(digest)?;
         Ok(builder.finish())
     }
 
@@ -371,6 +377,17 @@ mod tests {
                 prop_assert!(error.to_string().contains("not a linear oct-tree"), "{}", error);
                 prop_assert!(error.to_string().ends_with("run harness audit on it"), "{}", error);
             }
+        }
+    }
+
+    #[test]
+    fn leaves_that_the_manifest_does_not_state_are_refused() {
+        let mut set = leaf_set(vec![words_of(|o| o.level < 2)]);
+        set.parts[0].truncate(60);
+        let (_dir, mesh) = opened(&set);
+        let leaves = mesh.leaves(&|_| true, &mut |_| Ok(()));
+        for error in [leaves.unwrap_err(), mesh.tree().unwrap_err()] {
+            assert!(error.to_string().contains("its leaves have the digest"), "{error}");
         }
     }
 

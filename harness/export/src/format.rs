@@ -82,7 +82,11 @@ fn made(kind: &str, (name, write): (&str, Write), export: &Export, path: &Path) 
     let failed = |error: io::Error| Failure::at(path, error);
     let place = Staging::beside(path).map_err(failed)?;
     let (source, file) = (place.path().join(name), place.path().join("made"));
-    let written = write(export, &source)?;
+    let of_path = |Failure { code, why }| Failure {
+        code,
+        why: why.replace(&*source.to_string_lossy(), &path.to_string_lossy()),
+    };
+    let written = write(export, &source).map_err(of_path)?;
     (export.script)(kind, &source, &file)?;
     let mut made = File::open(&file).map_err(failed)?;
     let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
@@ -111,6 +115,35 @@ pub fn of(path: &Path) -> Result<&'static Format> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{in_root, on_disk, whole};
+    use contract::lattice::Root;
+    use contract::testing::words_of;
+
+    #[test]
+    fn an_error_names_the_file_and_not_what_it_is_made_of() {
+        let (dir, mesh) = on_disk(&words_of(|o| o.level < 1), 1, |_| 0);
+        let full: Write = |_, path| Err(Failure::at(path, io::Error::other("disk full")));
+        let path = dir.path().join("a.cgns");
+        let error = made("cgns", ("polyMesh", full), &whole(&mesh), &path).unwrap_err();
+        assert_eq!(error.why, format!("{}: disk full", path.display()));
+    }
+
+    #[test]
+    fn cells_that_coordinates_do_not_resolve_are_refused_where_they_are_written() {
+        let words = words_of(|o| o.level < 5 && o.corner == [0; 3]);
+        for (x, is_resolved) in [(1e11, true), (1e14, false)] {
+            let root = Root { origin: [0.0, -x, 0.0], edge: 1.0 };
+            let (dir, mesh) = in_root(&words, 1, |_| 0, root);
+            for (name, write) in [("a.vtu", vtu::write as Write), ("b/polyMesh", foam::write)] {
+                let written = write(&whole(&mesh), &dir.path().join(name));
+                assert_eq!(written.is_ok(), is_resolved, "{name} {x}");
+                let why = written.map_or_else(|error| error.why, |_| "do not resolve".to_owned());
+                assert!(why.contains("do not resolve"), "{why}");
+            }
+            let forest = p8est::write(&whole(&mesh), &dir.path().join("c.p8est"));
+            assert!(forest.is_ok(), "{forest:?}");
+        }
+    }
 
     #[test]
     fn the_name_of_the_file_decides() {

@@ -66,7 +66,7 @@ impl Leaves {
                 let word = word::encode(leaf.octant, leaf.side);
                 words.push(if is_selected { word } else { word | CUT });
             }
-            Ok(())
+            if is_selected { export.require_resolved(leaf.octant.level) } else { Ok(()) }
         })?;
         let why = "the mesh has 2^32 leaves or more, of which this format needs all, selected or not: write .vtu or .vtkhdf";
         Failure::unless(u32::try_from(words.len()).is_ok(), why)?;

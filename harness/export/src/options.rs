@@ -11,6 +11,7 @@ use std::path::Path;
 
 use contract::case::Case;
 use contract::failure::{Failure, Result};
+use contract::import::TOLERANCE;
 use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word::{self, KEY_END};
@@ -45,6 +46,17 @@ impl Export<'_> {
             })?,
         }
         self.require_some(leaves)
+    }
+
+    /// Refuses cells of a level that coordinates in double precision do not resolve as an import needs it.
+    pub(crate) fn require_resolved(&self, level: u8) -> Result<()> {
+        let root = &self.mesh.manifest.root;
+        let far = root.origin.iter().fold(root.edge, |far, at| far.max(at.abs()));
+        let edge = root.edge_of(level);
+        let why = format_args!(
+            "coordinates up to {far} do not resolve cells with the edge {edge}: move the geometry towards the origin, or write .p8est or .vtkhdf"
+        );
+        Failure::unless(far * f64::EPSILON <= TOLERANCE * edge, why)
     }
 
     /// Refuses an export without leaves.

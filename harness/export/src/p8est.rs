@@ -4,7 +4,7 @@
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
-//! data of each quadrant, one byte, is its side, `NO_SIDE` or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
+//! data of each quadrant, one byte, is its side, [`NO_SIDE`] or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
 //! The saved partition is that of one rank: p4est makes a uniform one, which is that of the mesher within its tolerance.
 
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -13,7 +13,7 @@ use std::path::Path;
 use contract::failure::{Failure, Result};
 use contract::files;
 use contract::import::forest::{ALIGNMENT, FORMAT};
-use contract::import::p4est::FILLER;
+use contract::import::p4est::{FILLER, NO_SIDE};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::mesh::Leaf;
@@ -24,8 +24,6 @@ use crate::options::{Export, Summary, Written};
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
-/// Data of a leaf whose side is unknown.
-const NO_SIDE: u8 = 4;
 /// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
 const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
@@ -228,6 +226,27 @@ mod tests {
                 .and_then(|cells| leaf_set(&cells, None, None, "test".to_owned()));
             prop_assert!(read.map_or(true, |set| set.manifest.digest != mesh.manifest.digest));
         }
+    }
+
+    #[test]
+    fn leaves_of_unknown_sides_are_read_again_without_fillers() {
+        let words = words_of(|o| o.level < 2)[3..].to_vec();
+        let (dir, mut mesh) = stored(vec![words.iter().map(|word| word & !3).collect()], ROOT);
+        mesh.manifest.sides = Sides::Unknown;
+        let (forest, _) = exported(&mesh, &Selection::default());
+        let path = forest.path().join("forest.p8est");
+        let set = import(&path, true);
+        assert_eq!(
+            (set.manifest.sides, set.manifest.digest),
+            (Sides::Unknown, mesh.manifest.digest)
+        );
+        // A side beside unknown ones is no file of an export.
+        let mut bytes = fs::read(&path).unwrap();
+        *bytes.last_mut().unwrap() = 1;
+        fs::write(dir.path().join("changed"), bytes).unwrap();
+        let request = Request { sides: Some("data".to_owned()), ..Request::default() };
+        let error = read(&dir.path().join("changed"), &request).unwrap_err().to_string();
+        assert!(error.contains("only some of its leaves have a side"), "{error}");
     }
 
     proptest! {

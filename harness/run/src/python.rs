@@ -38,7 +38,7 @@ pub fn run<A: AsRef<OsStr>>(
 fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Failure> {
     let python = &paths.python;
     if !python.is_file() {
-        let why = format!("needs Python at {} (ci/setup installs it)", python.display());
+        let why = format!("needs Python at {} (ci/setup, or HARNESS_PYTHON)", python.display());
         return Err(Failure::new(name, End::Missing(why)));
     }
     let script = paths.root.join("harness/oracles").join(script);

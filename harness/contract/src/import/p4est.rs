@@ -3,7 +3,8 @@
 //! Trees are placed by their vertices. `--root` maps the least cube around them onto the root; the root of a case does so for forests in the
 //! unit cube only, which most are, whatever the size of the body.
 //!
-//! A forest that `harness export` wrote has one byte of data per quadrant: the side, or [`FILLER`]. `--sides data` reads it. The
+//! A forest that `harness export` wrote has one byte of data per quadrant: the side, [`NO_SIDE`] or [`FILLER`]. `--sides data` reads it;
+//! otherwise data are those of any program, and fillers are cells. The
 //! attribute of its only tree, if it has one, is the edge of the root to the last bit.
 
 use super::cells::Cells;
@@ -20,6 +21,8 @@ use std::path::Path;
 const SIDES: &str = "data";
 /// The data of a quadrant that is not a leaf of the mesh: p4est's trees have no holes, so a hole is filled with such quadrants.
 pub const FILLER: u8 = 3;
+/// The data of a leaf in a mesh whose sides are unknown.
+pub const NO_SIDE: u8 = 4;
 
 /// Reads a forest.
 ///
@@ -59,6 +62,9 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
         let tree = Root { origin, edge: trees.edges[tree] * scale };
         add_tree(quadrants, length, &tree, &mut cells)?;
     }
+    cells.sides = cells.sides.filter(|sides| !sides.is_empty());
+    let is_whole = cells.sides.as_ref().is_none_or(|sides| sides.len() == cells.edges.len());
+    Failure::unless(is_whole, damaged("only some of its leaves have a side"))?;
     Ok(cells)
 }
 
@@ -115,8 +121,8 @@ fn add_tree(quadrants: &[Quadrant], length: i64, tree: &Root, cells: &mut Cells)
         next += word::span(level);
         match (&mut cells.sides, data) {
             (Some(_), FILLER) => continue,
+            (Some(_), NO_SIDE) | (None, _) => {}
             (Some(sides), code) => sides.push(side(f64::from(code), cells.edges.len())?),
-            (None, _) => {}
         }
         let along = corner.map(|c| f64::from(c) / length as f64 * tree.edge);
         cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), tree.edge_of(level));

@@ -241,11 +241,11 @@ impl Patches {
 }
 
 /// The name of a solid as a patch: characters that OpenFOAM's words may not have become underscores. Another solid whose name becomes the
-/// same has a number at its end.
+/// same has a number at its end. Cases give `proc.*` the values of boundaries between ranks.
 fn patch_name(solid: &str) -> String {
     let allowed = |c: char| c.is_alphanumeric() || "_-.+:".contains(c);
     let name: String = solid.chars().map(|c| if allowed(c) { c } else { '_' }).collect();
-    let is_taken = SIDES.contains(&&*name) || name == CUT || name.starts_with("procBoundary");
+    let is_taken = SIDES.contains(&&*name) || name == CUT || name.starts_with("proc");
     match name.as_str() {
         "" => BODY.to_owned(),
         _ if is_taken || !name.starts_with(|c: char| c.is_alphabetic() || c == '_') => {

@@ -80,7 +80,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
                 flush(&mut encoder)?;
             }
             encoder.leaves.push(leaf);
-            Ok(())
+            export.require_resolved(leaf.octant.level)
         })?;
         flush(&mut encoder)?;
         encoder.written.check_invariants(leaves);

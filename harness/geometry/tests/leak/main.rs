@@ -57,11 +57,16 @@ fn text(case: &Case, from: [f64; 3]) -> String {
 
 /// The narrowest place is the opening: its width to 5 %, which its bounds enclose, and its rim.
 fn assert_describes(report: &Report, body: &Body, what: &str) {
+    assert_describes_to(1.0501, report, body, what);
+}
+
+/// The same, with bounds that are apart by this factor.
+fn assert_describes_to(apart: f64, report: &Report, body: &Body, what: &str) {
     let narrowest = &report.passage.as_ref().unwrap().narrowest;
     let is_within =
         narrowest.width_min <= 1.001 * body.width && body.width <= 1.001 * narrowest.width_max;
     assert!(
-        is_within && narrowest.width_max <= 1.0501 * narrowest.width_min,
+        is_within && narrowest.width_max <= apart * narrowest.width_min,
         "{what}: {narrowest:?} for {}",
         body.width
     );
@@ -132,7 +137,9 @@ proptest! {
         };
         assert_levels(&report, &body, &what);
         if report.is_leak {
-            assert_describes(&report, &body, &what);
+            // A slit is as narrow in many places, where doc/leak.md promises less.
+            let apart = if body.name == "slit" { 1.4 } else { 1.0501 };
+            assert_describes_to(apart, &report, &body, &what);
         }
     }
 }

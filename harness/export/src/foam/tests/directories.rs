@@ -213,6 +213,7 @@ fn names_of_solids_become_words() {
         ("xMin", "body_xMin"),
         ("cut", "body_cut"),
         ("procBoundary0to1", "body_procBoundary0to1"),
+        ("processing_unit", "body_processing_unit"),
         ("2nd", "body_2nd"),
     ] {
         assert_eq!(patch_name(solid), patch);
