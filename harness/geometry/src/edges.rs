@@ -58,10 +58,19 @@ impl Edges {
     pub fn new(facets: &[Facet], lattice: &[FacetLattice]) -> Self {
         let (numbers, points) = number(facets);
         let is_sliver = |facet: u32| normal(&lattice[facet as usize]) == [0; 3];
-        let (mut corners, mut slivers) = (vec![None; facets.len()], HashSet::new());
+        // One of the copies is not left out: whichever the order of the facets, one that winds upward, if there is any.
+        let winds_down = |&[a, b, c]: &[u32; 3]| (a < b) ^ (b < c) ^ (c < a);
+        let slivers = numbers.iter().zip(0..).filter(|(_, facet)| is_sliver(*facet));
+        let mut slivers: Vec<_> =
+            slivers.map(|(at, facet)| (sorted(*at), winds_down(at), facet)).collect();
+        slivers.sort_unstable();
+        slivers.dedup_by_key(|(at, ..)| *at);
+        let mut queue: Vec<u32> = slivers.into_iter().map(|(.., facet)| facet).collect();
+        let first: HashSet<u32> = queue.iter().copied().collect();
+        let mut corners = vec![None; facets.len()];
         let mut uses = Vec::with_capacity(3 * facets.len());
         for (&[a, b, c], facet) in numbers.iter().zip(0..) {
-            let is_copy = is_sliver(facet) && !slivers.insert(sorted([a, b, c]));
+            let is_copy = is_sliver(facet) && !first.contains(&facet);
             if a == b || b == c || c == a || is_copy {
                 continue;
             }
@@ -70,8 +79,6 @@ impl Edges {
                 uses.push(Use { ends: sorted(ends), facet, is_down: ends[0] > ends[1] });
             }
         }
-        let all = 0..facets.len() as u32;
-        let mut queue: Vec<u32> = all.filter(|facet| is_sliver(*facet)).collect();
         // At the edges of slivers: the number of facets, and the exclusive or of their numbers, which is the last one of them.
         let mut left: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
         for one in uses.iter().filter(|one| is_sliver(one.facet)) {

@@ -87,7 +87,8 @@ impl Shells {
         let mut interiors: HashMap<usize, Parity> = HashMap::new();
         let closed: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_closed).collect();
         for &index in &closed {
-            let corner = lattice[all[index].facet_first as usize][0];
+            // Within an open shell, it may matter which corner: it does not depend on the order of the facets.
+            let corner = *own[index].iter().flatten().min().expect("a shell has facets");
             let mut contains = |other: &usize| {
                 let interior = interiors.entry(*other).or_insert_with(|| Parity::new(&own[*other]));
                 interior.inside(corner) == [true; 6]
@@ -97,7 +98,8 @@ impl Shells {
             let around = (0..all.len()).filter(may_be_in).filter(|other| contains(other));
             let around: Vec<i128> = around.map(|other| all[other].volume_sixfold).collect();
             all[index].is_nested = around.len() % 2 == 1;
-            let nearest = around.into_iter().min_by_key(|volume| volume.abs()).unwrap_or(1);
+            let nearest =
+                around.into_iter().min_by_key(|volume| (volume.abs(), *volume)).unwrap_or(1);
             all[index].is_cavity = (nearest < 0) != (all[index].volume_sixfold < 0);
         }
         Self { all, of }
