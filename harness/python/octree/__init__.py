@@ -202,9 +202,11 @@ def mesh(
         given += ["--layer-cells-min", str(operator.index(layer_cells))]
     place = tempfile.mkdtemp(prefix="octree-") if out is None else None
     directory = Path(out) if place is None else Path(place) / "mesh"
+    manifest = directory / "mesh.json"
+    is_other = manifest.is_file()  # Whatever makes a mesh refuses a directory that has one.
     try:
         printed = run("mesher", body, *given, *options, "--out", directory)
-        if not (directory / "mesh.json").is_file():
+        if is_other or not manifest.is_file():
             raise Failed(0, f"{options} make no mesh:\n{printed}")
         made = Mesh(directory)
     except BaseException:
