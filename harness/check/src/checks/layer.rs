@@ -5,8 +5,8 @@
 //! `keep` is `all`, for every l. Every leaf less than n - 1 cells of level D from a crossing leaf of level D has
 //! at least level D. If crossing leaves are deleted, leaves adjacent to one have at least level D: by the extra layer
 //! of section 6 for n < 3, and by the layers themselves for larger n. The check detects neither layers that are too
-//! thick nor, without the case, missing layers around deleted crossing leaves. With n = 1, the layers are the 2:1 balance at
-//! every level. Of the definition `balance` checks it, so that an imbalance is reported once; of a promise of layers this check does.
+//! thick nor, without the case, missing layers around deleted crossing leaves. With n = 1, touching leaves of
+//! every level are 2:1 balanced. Of the definition `balance` checks it, so that an imbalance is reported once; of a promise of layers this check does.
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::spacing::Crossed;
@@ -51,8 +51,9 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 fn check_layers(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
-        let required = n == 1 || terms.keep == Keep::All || level < terms.level_surface;
-        required.then(|| n * edge_of(level))
+        let layers = terms.keep == Keep::All || level < terms.level_surface;
+        // A finer box may look through a thin deleted body: what remains of layers of one cell is that touching leaves are balanced.
+        if layers { Some(n * edge_of(level)) } else { (n == 1).then_some(1) }
     };
     let what = &format!("a layer is thinner than {n} cell{}", if n == 1 { "" } else { "s" });
     check_gap(tree, (&terms.root, what), margin, &ALL_AXES, 1, result);
@@ -127,9 +128,11 @@ mod tests {
         leaves.iter().any(|(fine, side)| {
             leaves.iter().any(|(coarse, _)| {
                 let distance = fine.distance(coarse);
-                let levels = coarse.level + 1..fine.level;
-                let required = |l: &u8| n == 1 || all || *l < terms.level_surface;
-                let layer = levels.filter(required).any(|l| distance < n * edge_of(l));
+                let mut levels = coarse.level + 1..fine.level;
+                let layer = levels.any(|l| {
+                    let layers = all || l < terms.level_surface;
+                    layers && distance < n * edge_of(l) || n == 1 && distance == 0
+                });
                 let surface = terms.level_surface;
                 let at_surface = *side == Side::Crossing && fine.level == surface;
                 let surface_layer = distance < (n - 1) * edge_of(surface)
