@@ -40,7 +40,7 @@ pub use grow::grow;
 pub use mesh::Mesh;
 pub use record::{Job, Options};
 
-use error::Error;
+use error::{Error, agree};
 use files::interrupt::stop_at;
 use input::case::Case;
 use input::quantise::Quantised;
@@ -49,8 +49,8 @@ use output::report::Report;
 use output::write::OutDir;
 use output::{htg, leaves, stream};
 
-/// Meshes a case: all ten phases, if `may_run` has no error after phase 2: it sees the facets and the rules on the lattice. The report is the
-/// same on all ranks. Collective.
+/// Meshes a case, the same on all ranks: all ten phases, if `may_run` has no error on any rank after phase 2: it sees the facets and the
+/// rules on the lattice. The report is the same on all ranks. Collective.
 ///
 /// # Errors
 /// The same on all ranks. Then nothing is left in the output directory.
@@ -61,7 +61,8 @@ pub fn mesh(
 ) -> Result<Report, Error> {
     let out = job.options.out.as_ref().map(|output| OutDir::claim(output, job.comm)).transpose()?;
     let quantised = quantised(case, job)?;
-    may_run(&quantised, job)?;
+    let answer = may_run(&quantised, job);
+    ranks::uncounted(job.comm, || agree(job.comm, answer))?;
     let mesh = grow(quantised, job)?;
     let report = finish(&mesh, out.as_ref(), job)?;
     stop_at(format_args!("complete:{}", job.comm.rank()));

@@ -6,7 +6,7 @@ use cli::{Args, CommChoice, UNPRINTED, case, options, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::Job;
 use mesher::error::{Error, agree};
-use mesher::input::ingest::{self, Source};
+use mesher::input::ingest::Source;
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, first_other, launch, sim, text_of_first, uncounted};
@@ -89,8 +89,6 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
 fn run_mpi(asked: &Result<Args, Error>) -> i32 {
     /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
     const ADDRESS_SPACE_MPI: f64 = 384e6;
-    /// Time for rank 0 to end the job.
-    const PATIENCE: Duration = Duration::from_secs(10);
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(
@@ -98,9 +96,9 @@ fn run_mpi(asked: &Result<Args, Error>) -> i32 {
             left / 1e6,
             (ADDRESS_SPACE_MPI - left) / 1e6
         ));
-        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
+        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit, and has this time to do so.
         if !launch::is_first() {
-            sleep(PATIENCE);
+            sleep(Duration::from_secs(10));
         }
         return fail(&e, true);
     }
@@ -279,12 +277,6 @@ fn end_within(limit: Duration) {
     let _ = std::thread::Builder::new().spawn(end);
 }
 
-/// Makes the geometry known as an input: no output of the run may be that file.
-fn registered(source: &Source) -> Result<(), Error> {
-    let Source::Stl(path) = source else { return Ok(()) };
-    files::register_input(path).map_err(|e| Error::input(e).at(path))
-}
-
 /// Finds out that two options name one output, or one in the directory of another.
 fn named_apart(args: &Args) -> Result<(), Error> {
     let name = |path: &PathBuf| files::name_output(path).map_err(|e| Error::input(e).at(path));
@@ -303,8 +295,10 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     let apart = if comm.rank() == 0 { named_apart(args) } else { Ok(()) };
     agree(comm, apart.and_then(|()| on_json("choose another --json", &check_writable)))?;
     let case = case(args, comm)?;
-    agree(comm, registered(&case.source))?;
-    ingest::agree_on(&case.source, comm)?;
+    // No output may be the geometry.
+    if let Source::Stl(path) = &case.source {
+        agree(comm, files::register_input(path).map_err(|e| Error::input(e).at(path)))?;
+    }
     if let Some(dir) = &args.status {
         // Not before the inputs are known, which these files must not replace.
         let path = dir.join(format!("rank-{:05}.txt", comm.rank()));

@@ -7,6 +7,7 @@
 
 use crate::error::{Error, agree};
 use crate::input::stl;
+use bytemuck::cast_slice;
 use geometries::{Facet, Generator};
 use ranks::{Comm, MessageBuffer, first_other, uncounted};
 use std::hash::Hash;
@@ -21,7 +22,7 @@ pub enum Source {
     Stl(PathBuf),
     /// A shape that needs no file.
     Generated(Generator),
-    /// Facets in memory.
+    /// Facets in memory: all of them, on each rank.
     Given(Vec<Facet>),
 }
 
@@ -38,8 +39,9 @@ pub struct Slice {
 /// Reads this rank's slice. Collective.
 ///
 /// # Errors
-/// If the file cannot be read or is no STL file, or a coordinate is not finite.
+/// If the ranks have different geometries, the file cannot be read or is no STL file, or a coordinate is not finite.
 pub fn read(source: &Source, comm: &dyn Comm) -> Result<Slice, Error> {
+    agree_on(source, comm)?;
     let slice = match source {
         Source::Stl(path) => {
             let file = agree(comm, stl::open(path))?;
@@ -76,8 +78,7 @@ fn distribute(
     let (first, end) = range(total, comm.rank(), comm);
     if comm.size() > 1 {
         let mut messages = MessageBuffer::default();
-        let receivers = if comm.rank() == 0 { 1..comm.size() } else { 0..0 };
-        for r in receivers {
+        for r in (1..comm.size()).filter(|_| comm.rank() == 0) {
             let (start, end) = range(total, r, comm);
             messages.write_values(r, &facets[start as usize..end as usize]);
         }
@@ -89,22 +90,24 @@ fn distribute(
     Ok(Slice { facets, first, total })
 }
 
-/// Makes sure that all ranks will read the same geometry: with different files they would mesh parts of different meshes. Nothing of this
+/// Makes sure that all ranks have the same geometry: with different files they would mesh parts of different meshes. Nothing of this
 /// is counted as communication of the mesher. Collective.
 ///
 /// # Errors
 /// Names the first rank with another one than rank 0.
-pub fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
-    let Source::Stl(path) = source else { return Ok(()) };
-    let other = uncounted(comm, || {
+fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
+    let (name, other) = uncounted(comm, || match source {
         // Copies on several machines differ in their times only.
-        first_other(comm, &identity(path)).and_then(|_| first_other(comm, &content(path)))
+        Source::Stl(path) => {
+            let other = first_other(comm, &identity(path));
+            (path.as_path(), other.and_then(|_| first_other(comm, &content(path))))
+        }
+        Source::Generated(_) => (Path::new(""), None),
+        Source::Given(all) => (Path::new("facets"), first_other(comm, &cast_slice::<_, u8>(all))),
     });
     let Some(rank) = other else { return Ok(()) };
-    let file = path.display();
-    Err(Error::input(format!(
-        "rank {rank} has another file {file} than rank 0: start all ranks with the same files"
-    )))
+    let why = "has another geometry than rank 0: start all ranks with the same files or facets";
+    Err(Error::input(format!("rank {rank} {why}")).at(name))
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.
@@ -157,10 +160,17 @@ mod tests {
             agreed.into_iter().map(|agreed| agreed.map_err(|e| e.to_string())).collect::<Vec<_>>()
         };
         assert_eq!(found(["a.stl", "b.stl"]), [Ok(()), Ok(())]);
-        assert!(
-            found(["a.stl", "c.stl"]).iter().all(|agreed| agreed
-                .as_ref()
-                .is_err_and(|e| e.contains("rank 1 has another file")))
-        );
+        assert!(found(["a.stl", "c.stl"]).iter().all(|agreed| {
+            agreed.as_ref().is_err_and(|e| e.contains("rank 1 has another geometry"))
+        }));
+    }
+    #[test]
+    fn facets_in_memory_are_the_same_on_all_ranks_or_refused() {
+        let read = |of: [usize; 2]| {
+            let source = |rank: usize| Source::Given(vec![[[rank as f32; 3]; 3]; 4]);
+            sim::run(2, 1, |comm| read(&source(of[comm.rank()]), comm).map(|slice| slice.total))
+        };
+        assert!(read([1, 1]).into_iter().all(|total| total.is_ok_and(|total| total == 4)));
+        assert!(read([0, 1]).into_iter().all(|total| total.is_err()));
     }
 }

@@ -10,9 +10,10 @@ const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if t
     leaks through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
 const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
     to the far field, or set keep = inside if the flow is internal";
-const BOXES_WITHOUT_EFFECT: &str = "an extent box ([[box]]) has no volume within the root: nothing is refined there; correct its corners or their unit";
-const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the root unless the body is meant to \
-    extend beyond it";
+const BOXES_WITHOUT_EFFECT: &str =
+    "an extent box ([[box]]) has no volume within the root: correct its corners or their unit";
+const NO_FACETS: &str = "the geometry has no facets: the mesh is that of the boxes alone; export the body again unless that is meant";
+const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body: enlarge or move the root unless that is meant";
 
 /// A sentence for each warning: what was found, and what to try. Nothing is deleted from T0 yet, so it has those of its inputs, rays and leaks
 /// only.
@@ -28,6 +29,7 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
         (flow_at_boundary, FLOW_AT_BOUNDARY),
         (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
+        (mesh.facets.total == 0, NO_FACETS),
         (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
     ];
     let Ambiguous { count, example } = summary.ambiguous;
@@ -69,9 +71,8 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
 fn bounds_nothing(rules: &Rules, case_name: &str) -> String {
     let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
     format!(
-        "the facets bound no inside at spacings of {spacing}, {} and {}, and are no sheet: either the flow fills the body through \
-         openings, which `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as \
-         `harness geometry` states, or the body is thinner than its cells; close the openings, remove the copies, or change spacing_min",
+        "the facets bound no inside at spacings of {spacing}, {} and {}, and are no sheet: close the openings that `harness leak {case_name} \
+         --from X,Y,Z` finds from a point in the body, remove the facets that appear twice (`harness geometry`), or refine a thin body",
         2.0 * spacing,
         4.0 * spacing
     )
@@ -87,9 +88,8 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
         ),
         Keep::Inside => (
             inside,
-            "nothing is inside the geometry, so the mesh has at most crossing leaves: close inlets, outlets and holes that are \
-             wider than a cell (`harness leak` finds them), remove facets that appear twice (`harness geometry`), change spacing_min, or \
-             set keep = outside",
+            "nothing is inside the geometry, so the mesh has at most crossing leaves: close openings wider than a cell \
+             (`harness leak`), remove facets that appear twice (`harness geometry`), change spacing_min, or set keep = outside",
         ),
         Keep::All => (outside + inside, "the geometry crosses all leaves: decrease spacing_min"),
     };

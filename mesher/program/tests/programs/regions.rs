@@ -206,6 +206,7 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
         ),
         (box_in_box(), &["--seed", "16,32,32"], "the flow of no seed reaches the root's boundary"),
         (cuboid([-8.0, 8.0, 8.0], [56.0; 3]), &[], "facets lie wholly or partly beyond the root"),
+        (vec![], &[], "the geometry has no facets"),
     ] {
         let (report, stderr) = meshed(&facets, options);
         let warnings = report["warnings"].as_array().expect("a list");
