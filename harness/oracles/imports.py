@@ -59,7 +59,7 @@ def run(read):
     try:
         # NumPy's `tofile` does not notice that the end was not written.
         with open(sys.argv[2], "wb") as file:
-            file.write(np.column_stack([corners, edges, *columns]).astype("<f8"))
+            file.write(np.column_stack([corners, edges, *columns]).astype("<f8", order="C"))
     except OSError as error:
         print(f"was read, but its cells cannot be written to a temporary file: {error}", file=sys.stderr)
         raise SystemExit(2) from None
