@@ -248,8 +248,8 @@ fn leaves_are_those_of_the_mesh_and_the_rank_with_most_of_them_counts() {
         let text = script.replacen("[ -z \"$out\" ]", &of, 1);
         let counted = "\"counters\": {\"rank_words_max\": [%s], \"leaves\": [%s], \"words\"";
         let text = text.replace("\"counters\": {\"words\"", counted);
-        let values = "\"$leaves\" \"$leaves\" \"$(grep -c outer";
-        fixture.program(name, &text.replace("\"$(grep -c outer", values));
+        let values = "\"$leaves\" \"$leaves\" $((($(wc";
+        fixture.program(name, &text.replace("$((($(wc", values));
     };
     with("even", 8, ["8", "4,4"]);
     with("uneven", 8, ["8", "8,0"]);
