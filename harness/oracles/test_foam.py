@@ -74,7 +74,7 @@ class FoamTest(unittest.TestCase):
         than the surface and overlap."""
         choice = random.Random(1)
         cases = [(keep, crossing) for keep in ("all", "outside", "inside") for crossing in ("true", "false")]
-        for i, (keep, crossing) in enumerate(2 * cases):
+        for keep, crossing in 2 * cases:
             bodies = [("sphere", 320), ("torus", 400), ("boxes_overlapping", 200), ("uav", 2000)]
             # No cell lies inside the thin parts of the aircraft.
             body, facets = choice.choice(bodies[:3] if keep == "inside" else bodies)
@@ -90,7 +90,7 @@ class FoamTest(unittest.TestCase):
                 shutil.rmtree(self.at / "mesh", ignore_errors=True)
                 shutil.rmtree(self.at / "case/constant/polyMesh", ignore_errors=True)
                 self.mesh(text)
-                self.export(*(["--label", "64"] if i % 2 else []))
+                self.export()
                 output = self.check_mesh()
                 self.assertIn("\nMesh OK.", output)
                 levels = (self.at / "case/constant/polyMesh/cellLevel").read_bytes()
@@ -117,7 +117,7 @@ class FoamTest(unittest.TestCase):
             for name in ("mesh", "case/constant/polyMesh"):
                 shutil.rmtree(self.at / name, ignore_errors=True)
             call(self.at, PROGRAMS / "harness", "import", "words.npy", "--out", "mesh")
-            self.export("--label", "64")
+            self.export()
             output = call_any(self.at / "case", "checkMesh", "-allTopology")
             for test in TOPOLOGY:
                 self.assertIn(f"{test} OK.", output)

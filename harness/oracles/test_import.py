@@ -56,6 +56,19 @@ def hexahedra(rows, sides, dtype=np.float64, cell_type=pyvista.CellType.HEXAHEDR
     return grid
 
 
+def widen_labels(place):
+    """Makes the labels of 32 bits in a polyMesh those of 64 bits that an export of a large mesh has."""
+    for path in place.iterdir():
+        head, rest = path.read_bytes().split(b"}\n\n", 1)
+        lists, is_of_labels = b"", b"labelList" in head or b"faceCompactList" in head
+        while rest and is_of_labels:
+            count, rest = rest.split(b"\n(", 1)
+            size = 4 * int(count)
+            lists += count + b"\n(" + np.frombuffer(rest[:size], "<i4").astype("<i8").tobytes() + b")\n"
+            rest = rest[size + 2 :]
+        path.write_bytes(head.replace(b"label=32", b"label=64") + b"}\n\n" + lists + rest)
+
+
 def hyper_trees(rows, sides, trees, masked):
     """The leaves as a hyper-tree grid of `trees` trees along each axis, with the leaves of side 1 masked or not."""
     side_of = {tuple(row): side for row, side in zip(rows.tolist(), sides.tolist())}
@@ -247,12 +260,13 @@ class ImportTest(unittest.TestCase):
         self.assertEqual(run("reference", ROOT / "geometries/cube-small.toml", "--out", mesh)[0], 0)
         expected = json.loads((mesh / "mesh.json").read_text())
         root = ",".join(map(repr, [*expected["root"]["origin"], expected["root"]["edge"]]))
-        for number, options in enumerate([(), ("--label", "64")]):
-            target = self.at / f"case{number}/constant/polyMesh"
-            code, _, error = run("harness", "export", mesh, target, *options)
-            self.assertEqual(code, 0, error)
+        target = self.at / "case/constant/polyMesh"
+        code, _, error = run("harness", "export", mesh, target)
+        self.assertEqual(code, 0, error)
+        for widen in (lambda _: None, widen_labels):
+            widen(target)
             _, manifest = self.imported(target, "--sides", "side", "--root", root)
-            self.assertEqual(manifest["digest"], expected["digest"], options)
+            self.assertEqual(manifest["digest"], expected["digest"], widen)
 
     def test_an_audit_of_a_file_needs_no_manifest(self):
         path = self.at / "mesh.vtu"

@@ -87,12 +87,12 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("part.vtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
         ("part.vtu", &["--rank", "2"], "--rank 2: the mesh has 2 ranks, from 0 on"),
-        ("part.vtu", &["--label", "64"], "--label has no effect on .vtu"),
-        ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
+        ("part.vtu", &["--regions", "all"], "--case and --regions have no effect on .vtu"),
+        ("part.vtu", &["--case", "cube-small"], "--case and --regions have no effect on .vtu"),
         ("polyMesh", &[], "one that ends in .vtu, .p8est, /polyMesh"),
-        ("front.stl", &["--case", "cube-small"], "--case has no effect on .stl"),
+        ("front.stl", &["--case", "cube-small"], "--case and --regions have no effect on .stl"),
         ("front.stl", &["--side", "crossing"], "no selected cell borders a crossing cell"),
-        ("front.vtp", &["--case", "cube-small"], "--case has no effect on .vtp"),
+        ("front.vtp", &["--case", "cube-small"], "--case and --regions have no effect on .vtp"),
         ("case/constant/polyMesh", &["--case", "absent.toml"], "absent.toml"),
         (
             "case/constant/polyMesh",
@@ -113,7 +113,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
 #[test]
 fn a_poly_mesh_is_a_directory_of_a_case() {
     let place = mesh();
-    let (code, output, error) = export(&place, "case/constant/polyMesh", &["--label", "64"]);
+    let (code, output, error) = export(&place, "case/constant/polyMesh", &[]);
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(output.starts_with("case/constant/polyMesh: 148 cells, "), "{output}");
     assert!(output.contains("faces of each patch: xMin "), "{output}");

@@ -16,62 +16,44 @@ pub struct Format {
     pub ending: &'static str,
     /// What it contains and which programs read it, for the user.
     pub purpose: &'static str,
-    /// Those of the options `--case`, `--label` and `--regions` that have an effect.
-    pub options: &'static [&'static str],
     /// Writes the selected leaves of a mesh.
     pub write: Write,
 }
 
 /// All formats.
 pub const FORMATS: &[Format] = &[
-    Format {
-        ending: ".vtu",
-        purpose: "cells for ParaView, VisIt and pyvista",
-        options: &[],
-        write: vtu::write,
-    },
+    Format { ending: ".vtu", purpose: "cells for ParaView, VisIt and pyvista", write: vtu::write },
     Format {
         ending: ".p8est",
         purpose: "a forest for p8est_load of p4est, deal.II, t8code and ForestClaw",
-        options: &[],
         write: p8est::write,
     },
     Format {
         ending: "/polyMesh",
         purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",
-        options: &["--case", "--label", "--regions"],
         write: foam::write,
     },
     Format {
         ending: ".cgns",
         purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
-        options: &["--case", "--regions"],
         write: |export, path| made("cgns", ("polyMesh", foam::write), export, path),
     },
     Format {
         ending: ".mfem",
         purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
-        options: &[],
         write: |export, path| made("mfem", ("mesh.p8est", p8est::write), export, path),
     },
     Format {
         ending: ".vtkhdf",
         purpose: "the tree, a hyper-tree grid of 0.05 bytes per cell, for ParaView and VTK; other leaves are masked",
-        options: &[],
         write: htg::write,
     },
     Format {
         ending: ".vtp",
         purpose: "the surface towards the body, for a near-body mesher: polygons for VTK",
-        options: &[],
         write: front::vtp,
     },
-    Format {
-        ending: ".stl",
-        purpose: "the same surface as triangles",
-        options: &[],
-        write: front::stl,
-    },
+    Format { ending: ".stl", purpose: "the same surface as triangles", write: front::stl },
 ];
 
 /// Writes the selected leaves of a mesh in another format, whose file has this name, and has the script make this format of it.

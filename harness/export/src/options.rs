@@ -26,8 +26,6 @@ pub struct Export<'a> {
     pub selection: &'a Selection,
     /// The case of the mesh: its solids become patches of OpenFOAM.
     pub case: Option<&'a Case>,
-    /// Width of OpenFOAM's labels.
-    pub label: Label,
     /// The regions that are exported to OpenFOAM.
     pub regions: Regions,
     /// Runs the script that makes a file of this format: its source and the file.
@@ -69,18 +67,6 @@ impl Export<'_> {
     pub(crate) fn is_of_all(&self) -> bool {
         *self.selection == Selection::default()
     }
-}
-
-/// Width of the numbers of cells, faces and points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Label {
-    /// OpenFOAM's default
-    #[default]
-    #[value(name = "32")]
-    Bits32,
-    /// For more than about 169 million cells
-    #[value(name = "64")]
-    Bits64,
 }
 
 /// What becomes of cells that faces do not connect with the largest region.

@@ -1,6 +1,6 @@
 //! Meshes on disk, for tests.
 
-use crate::options::{Export, Label, Regions};
+use crate::options::{Export, Regions};
 use crate::selection::Selection;
 use contract::failure::Result;
 use contract::lattice::Root;
@@ -20,8 +20,7 @@ fn no_script(_: &str, _: &Path, _: &Path) -> Result<()> {
 
 /// An export of the selected leaves of a mesh.
 pub fn export<'a>(mesh: &'a Mesh, selection: &'a Selection) -> Export<'a> {
-    let (label, regions) = (Label::default(), Regions::default());
-    Export { mesh, selection, case: None, label, regions, script: no_script }
+    Export { mesh, selection, case: None, regions: Regions::default(), script: no_script }
 }
 
 /// An export of all leaves of a mesh.

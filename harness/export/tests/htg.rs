@@ -11,7 +11,7 @@ use contract::mesh::Leaf;
 use contract::mesh::Mesh;
 use contract::testing::random_words;
 use contract::word;
-use export::options::{Export, Label, Regions};
+use export::options::{Export, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
@@ -37,8 +37,7 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("mesh.vtkhdf");
     let script = |_: &str, _: &Path, _: &Path| unreachable!("no script makes this format");
-    let (label, regions) = (Label::Bits32, Regions::All);
-    let export = Export { mesh, selection, case: None, label, regions, script };
+    let export = Export { mesh, selection, case: None, regions: Regions::All, script };
     match export::htg::write(&export, &path) {
         Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),

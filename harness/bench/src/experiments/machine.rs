@@ -18,15 +18,10 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
         memory_bytes: sysinfo().totalram * u64::from(sysinfo().mem_unit),
         kernel: format!("Linux {}", uname().release().to_string_lossy()),
         mpi: first_line(Command::new(mpirun).arg("--version")),
-        compiler: compiler(),
+        compiler: first_line(Command::new("rustc").arg("--version")),
         commit: git(place, &["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
             .unwrap_or_default(),
     }
-}
-
-/// The compiler on the path; empty if there is none.
-pub(crate) fn compiler() -> String {
-    first_line(Command::new("rustc").arg("--version"))
 }
 
 impl Machine {

@@ -2,27 +2,22 @@
 //!
 //! Each revision has a directory of its own, with its files in `tree` and the results of its build in `build`. Both are
 //! kept whole, because a program may need libraries or data beside it, and are used where they were built. The repository, its
-//! index and its working tree stay unchanged.
-//!
-//! Invariant: a directory that contains the file `built` has the result of the build command in that file, by the compiler and with the
-//! environment in it.
+//! index and its working tree stay unchanged. The build command is always run: cargo and make know better than the gate what a build
+//! depends on, and compile nothing twice.
 
 use super::GateOptions;
 use super::measures::{CaseMeasures, Measured, WORKING_TREE};
-use crate::experiments::machine::{compiler, digest_of};
+use crate::experiments::machine::digest_of;
 use crate::git;
 use contract::failure::{Failure, Result};
 use run::engine::description::Build;
 use run::engine::failure::Failure as Ended;
-use run::engine::paths::on_path;
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use run::engine::templates::{Values, fill};
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
-use std::env;
+use std::collections::BTreeMap;
 use std::fs;
-use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -107,7 +102,7 @@ impl Subject {
     }
 }
 
-/// Returns the program of a revision, built unless an earlier gate has kept it, or that of the repository's working tree.
+/// Builds and returns the program of a revision, or that of the repository's working tree.
 fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf> {
     let cache = repository.join("target/gate");
     let place = cache.join(revision.unwrap_or("working-tree"));
@@ -121,13 +116,8 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    let (done, with) = (place.join("built"), build.command.join("\n") + "\n" + &environment());
     let mut label = "the working tree";
     if let Some(revision) = revision {
-        let is_built = fs::read_to_string(&done).is_ok_and(|of| of == with);
-        if is_built && program.is_file() {
-            return Ok(program);
-        }
         let mut archive = Command::new("sh");
         archive.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
         archive.arg(repository).arg(revision).arg(tree);
@@ -135,8 +125,6 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));
-    // A build that fails may have replaced the program.
-    let _ = fs::remove_file(&done);
     let (builder, arguments) =
         words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
     let mut command = Command::new(builder);
@@ -149,25 +137,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let why = format!("the build succeeded, but {} is missing", program.display());
     let why = format!("{label}: {why}: check [build] program");
     Failure::unless(program.is_file(), why)?;
-    fs::write(&done, with).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
-}
-
-/// What the result of a build depends on beside its sources and its command: the compiler, the variables of Cargo and of compilers, and
-/// where MPI is.
-fn environment() -> String {
-    let is_of_build = |name: &str| {
-        let is_of_tool = name.starts_with("CARGO_") || name.starts_with("RUSTC");
-        let is_of_compiler = name.ends_with("FLAGS") || ["CC", "CXX", "AR", "LD"].contains(&name);
-        // Credentials, and what a terminal, make and `cargo run` set, change no build.
-        let others = ["TOKEN", "TERM", "PKG", "MANIFEST", "HOME", "MAKEFLAGS"];
-        (is_of_tool || is_of_compiler) && !others.iter().any(|part| name.contains(part))
-    };
-    let all = env::vars_os().filter(|(name, _)| name.to_str().is_some_and(is_of_build));
-    let variables: BTreeSet<String> = all.map(|of| format!("{of:?}")).collect();
-    // Values may be secret.
-    let digest = BuildHasherDefault::<DefaultHasher>::default().hash_one(variables);
-    format!("{}\nmpicc: {:?}\nvariables: {digest:x}", compiler(), on_path("mpicc"))
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

@@ -11,7 +11,6 @@ pub mod reduce;
 
 use contract::failure::{Failure, Result};
 use contract::files::Staging;
-use contract::plain::StlForm;
 use probe::{Fault, Judged, Trial};
 use reduce::size;
 use run::engine::interrupt;
@@ -110,7 +109,7 @@ pub fn write(
     staging: &Staging,
     directory: &Path,
 ) -> io::Result<String> {
-    shrunk.trial.case.write(staging.path(), StlForm::Any)?;
+    shrunk.trial.case.write(staging.path())?;
     let case = directory.join("case.toml").display().to_string();
     let words = ["harness", "shrink", &case, "--test-only", "--check", &shrunk.fault.check];
     // Arguments of a process contain no NUL, the one character that a shell cannot quote.

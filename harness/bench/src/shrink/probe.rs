@@ -9,7 +9,6 @@ use contract::failure::{Failure, Result};
 use contract::leafset::LeafSet;
 use contract::manifest::Tree;
 use contract::plain::PlainCase;
-use run::engine::description::Description;
 use run::engine::failure::{End, Failure as Ended};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
@@ -94,8 +93,8 @@ impl Probe {
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
     pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
-        let Description { takes, promises, .. } = &self.engine.description;
-        let path = trial.case.write(self.place.path(), takes.stl)?;
+        let promises = &self.engine.description.promises;
+        let path = trial.case.write(self.place.path())?;
         let case = Case::read(&path)?;
         if let Some(why) = self.engine.description.declines(&case) {
             return Err(left_out(&why));

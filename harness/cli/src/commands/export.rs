@@ -5,7 +5,7 @@ use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure, Progress, Result};
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS};
-use export::options::{Export, Label, Regions, Summary};
+use export::options::{Export, Regions, Summary};
 use run::engine::paths::Paths;
 use run::python;
 use std::path::{Path, PathBuf};
@@ -25,9 +25,6 @@ pub struct Arguments {
     /// The case that was meshed: its named solids become patches (polyMesh, .cgns); name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
     case: Option<String>,
-    /// Bits of a label of OpenFOAM [default: 32]
-    #[arg(long, value_name = "BITS")]
-    label: Option<Label>,
     /// Regions of cells that no face connects, for OpenFOAM and CGNS [default: all]
     #[arg(long)]
     regions: Option<Regions>,
@@ -47,17 +44,11 @@ fn after_help() -> String {
 /// # Errors
 /// If the mesh cannot be read, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let Arguments { mesh, file, case, label, regions, selection } = arguments;
+    let Arguments { mesh, file, case, regions, selection } = arguments;
     let format = format::of(file)?;
-    let given = [
-        ("--case", case.is_some()),
-        ("--label", label.is_some()),
-        ("--regions", regions.is_some()),
-    ];
-    let of_format = |name| format.options.contains(name);
-    if let Some((name, _)) = given.iter().find(|(name, is_given)| *is_given && !of_format(name)) {
-        return Err(Failure::input(format!("{name} has no effect on {}: omit it", format.ending)));
-    }
+    let has_patches = ["/polyMesh", ".cgns"].contains(&format.ending);
+    let why = format!("--case and --regions have no effect on {}: omit them", format.ending);
+    Failure::unless(has_patches || case.is_none() && regions.is_none(), why)?;
     if format.ending != "/polyMesh" {
         files::check_writable(file).map_err(|error| Failure::at(file, error))?;
     }
@@ -72,7 +63,6 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         mesh: &mesh,
         selection: &selection,
         case: case.as_ref(),
-        label: label.unwrap_or_default(),
         regions: regions.unwrap_or_default(),
         script,
     };

@@ -7,7 +7,7 @@ use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Progress, Result, Watch};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
-use contract::plain::{PlainCase, StlForm};
+use contract::plain::PlainCase;
 use geometry::leak::{Leaks, Target};
 use report::pretty;
 use run::engine::layout::SERIAL;
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         }
         let spacing = case.root.edge / f64::from(1u32 << level);
         plain.table.insert("spacing_min".into(), spacing.into());
-        let file = plain.write(place.path(), StlForm::Binary)?;
+        let file = plain.write(place.path())?;
         let mesh = mesher.mesh(&file, &SERIAL, true, (place.path(), arguments.timeout))?;
         let tree = mesher.read_mesh(&mesh)?;
         fs::remove_dir_all(mesh)?;

@@ -213,8 +213,6 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64)> {
     let [format, index_bytes] = input.array()?;
     let [vertices, trees, edges, edge_trees] = input.array()?;
     let [corners, corner_trees, attribute_bytes, _] = input.array()?;
-    let why = "its bytes are swapped: a big-endian machine wrote it";
-    Failure::unless(format.swap_bytes() != expected, damaged(why))?;
     let why = format!(
         "its format is {format:#x} with indices of {index_bytes} bytes, and {expected:#x} with 4 is supported"
     );

@@ -6,31 +6,27 @@ use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 use bytemuck::NoUninit;
-use contract::manifest::Sides;
+use contract::manifest::{Manifest, Sides};
 use contract::word;
 
 use super::Mesh;
-use crate::options::{Export, Label};
 use crate::points::to_user;
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Progress, Result, Watch};
 
 impl Mesh {
-    /// Writes the files into a directory.
+    /// Writes the files into a directory, with labels of 64 bits if they are wide, and else of 32.
     ///
     /// # Errors
-    /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
-    pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<()> {
-        let (faces, label, manifest) = (&self.faces, export.label, &export.mesh.manifest);
+    /// If a file cannot be written, or if the user interrupts.
+    pub fn write(&self, manifest: &Manifest, is_wide: bool, dir: &Path) -> Result<()> {
+        let faces = &self.faces;
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices = faces.vertices.corners.len() as u64;
-        let fits = label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
-        let why = "the faces have more vertices than 32 bits can number: select a part, or write a polyMesh with --label 64";
-        Failure::unless(fits, why)?;
         let (count, internal) = (faces.count(), faces.neighbour.len());
         let note =
             format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");
         let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
-            let mut file = ListFile::create(dir, label, ["labelList", object, note])?;
+            let mut file = ListFile::create(dir, is_wide, ["labelList", object, note])?;
             file.labels(labels.len() as u64, labels)?;
             file.finish()
         };
@@ -45,19 +41,19 @@ impl Mesh {
             labels("rank", "", &mut ranks.iter().map(|&rank| rank.into()))?;
         }
         let ends = faces.vertices.ends.iter().map(|&end| end as i64);
-        let mut file = ListFile::create(dir, label, ["faceCompactList", "faces", ""])?;
+        let mut file = ListFile::create(dir, is_wide, ["faceCompactList", "faces", ""])?;
         file.labels(count as u64 + 1, std::iter::once(0).chain(ends))?;
         file.labels(vertices, faces.vertices.corners.iter().map(|&point| point.into()))?;
         file.finish()?;
-        let mut file = ListFile::create(dir, label, ["vectorField", "points", ""])?;
+        let mut file = ListFile::create(dir, is_wide, ["vectorField", "points", ""])?;
         file.list(points, self.points.all.iter().map(|at| to_user(at, &manifest.root)))?;
         file.finish()?;
-        self.write_boundary(label, dir)
+        self.write_boundary(is_wide, dir)
     }
 
-    fn write_boundary(&self, label: Label, dir: &Path) -> Result<()> {
+    fn write_boundary(&self, is_wide: bool, dir: &Path) -> Result<()> {
         let Self { patches, faces, .. } = self;
-        let mut text = header("ascii", label, "polyBoundaryMesh", "boundary", "");
+        let mut text = header("ascii", is_wide, "polyBoundaryMesh", "boundary", "");
         let _ = writeln!(text, "{}\n(", patches.names.len());
         for ((patch, name), ends) in patches.names.iter().enumerate().zip(faces.starts.windows(2)) {
             let (kind, start, count) = (patches.type_of(patch), ends[0], ends[1] - ends[0]);
@@ -74,8 +70,8 @@ impl Mesh {
 }
 
 /// The dictionary at the beginning of a file.
-fn header(format: &str, label: Label, class: &str, object: &str, note: &str) -> String {
-    let bits = if label == Label::Bits32 { 32 } else { 64 };
+fn header(format: &str, is_wide: bool, class: &str, object: &str, note: &str) -> String {
+    let bits = if is_wide { 64 } else { 32 };
     let note = if note.is_empty() { String::new() } else { format!("    note \"{note}\";\n") };
     format!(
         "FoamFile\n{{\n    version 2.0;\n    format {format};\n    arch \"LSB;label={bits};scalar=64\";\n{note}    \
@@ -86,22 +82,22 @@ fn header(format: &str, label: Label, class: &str, object: &str, note: &str) -> 
 /// A file with lists.
 struct ListFile {
     out: BufWriter<File>,
-    label: Label,
+    is_wide: bool,
 }
 
 impl ListFile {
     /// Begins a file.
-    fn create(dir: &Path, label: Label, [class, object, note]: [&str; 3]) -> Result<Self> {
+    fn create(dir: &Path, is_wide: bool, [class, object, note]: [&str; 3]) -> Result<Self> {
         let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
-        out.write_all(header("binary", label, class, object, note).as_bytes())?;
-        Ok(Self { out, label })
+        out.write_all(header("binary", is_wide, class, object, note).as_bytes())?;
+        Ok(Self { out, is_wide })
     }
 
     /// Adds a list of `count` labels.
     fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<()> {
-        match self.label {
-            Label::Bits32 => self.list(count, labels.map(|label| label as i32)),
-            Label::Bits64 => self.list(count, labels),
+        match self.is_wide {
+            true => self.list(count, labels),
+            false => self.list(count, labels.map(|label| label as i32)),
         }
     }
 

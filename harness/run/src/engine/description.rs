@@ -11,7 +11,6 @@ use contract::case::{Case, explain};
 use contract::failure::{Failure, Result};
 use contract::manifest::{Enclosed, Keep};
 use contract::octant::LEVEL_MAX;
-use contract::plain::StlForm;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -79,7 +78,7 @@ pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Takes {
-    /// `[generator]` and `root_scale`. If not, the engine is given an STL file and an explicit root.
+    /// `[generator]` and `root_scale`. If not, the engine is given a binary STL file and an explicit root.
     pub generator: bool,
     /// Extent boxes.
     pub boxes: bool,
@@ -92,8 +91,6 @@ pub struct Takes {
     /// `enclosed = "keep"`. The default, `delete`, cannot be declined: whether anything is enclosed is known after
     /// meshing only.
     pub keep_enclosed: bool,
-    /// The form of its STL file.
-    pub stl: StlForm,
 }
 
 impl Default for Takes {
@@ -105,7 +102,6 @@ impl Default for Takes {
             drop_crossing: true,
             seeds: false,
             keep_enclosed: false,
-            stl: StlForm::Any,
         }
     }
 }

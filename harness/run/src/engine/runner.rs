@@ -14,7 +14,7 @@ use contract::case::Case;
 use contract::failure::{Failure as Refusal, named};
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
-use contract::plain::{PlainCase, StlForm};
+use contract::plain::PlainCase;
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
@@ -139,17 +139,16 @@ impl Engine {
         options.mesh.map(Path::to_owned).or(always.then(|| options.place.join("mesh")))
     }
 
-    /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file
-    /// in the engine's form and an explicit root, written to `directory`.
+    /// A case file equivalent to `case` that the engine can read: `case` itself, or one with a binary STL file
+    /// and an explicit root, written to `directory`.
     ///
     /// # Errors
     /// If the case cannot be read or the other one cannot be written.
     pub fn prepare(&self, case: &Path, directory: &Path) -> Result<PathBuf, Refusal> {
-        let takes = &self.description.takes;
-        if takes.generator && takes.stl == StlForm::Any {
+        if self.description.takes.generator {
             return Ok(case.to_owned());
         }
-        Ok(PlainCase::of(&Case::read(case)?).write(directory, takes.stl)?)
+        Ok(PlainCase::of(&Case::read(case)?).write(directory)?)
     }
 
     /// The values of the placeholders that do not depend on a run.

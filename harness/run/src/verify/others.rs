@@ -115,7 +115,7 @@ impl CaseRun<'_> {
         let (subject, name) = step;
         let left_out = |why| Ok(Check::new(subject, name, Outcome::left_out(why)));
         let (case, place) = (plain(PlainCase::of(case)), self.place.join("plain-case"));
-        let written = case.write(&place, self.engine().takes.stl)?;
+        let written = case.write(&place)?;
         let case = Case::read(&written).map_err(io::Error::other)?;
         if let Some(why) = self.engine().declines(&case) {
             return left_out(why);

@@ -14,7 +14,6 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::leaves::{CUT, Square};
-use crate::options::Label;
 use crate::points::Point;
 use crate::selection::Selection;
 pub use crate::testing::{export, whole};
@@ -52,6 +51,12 @@ fn lists<const N: usize>(path: &Path, sizes: [usize; N]) -> [Vec<u8>; N] {
     });
     assert!(rest.is_empty(), "{}", path.display());
     found
+}
+
+/// Labels of 32 bits as labels of 64.
+fn widened(bytes: &[u8]) -> Vec<u8> {
+    let labels = bytes.as_chunks().0.iter().map(|label| i64::from(i32::from_le_bytes(*label)));
+    labels.flat_map(i64::to_le_bytes).collect()
 }
 
 fn labels_of(bytes: &[u8]) -> Vec<usize> {
@@ -196,14 +201,30 @@ proptest! {
 
     /// Their content is tested by `harness import`, in `oracles/test_import.py`.
     #[test]
-    fn files_are_as_long_as_the_summary_states(
-        words in random_words(3), is_wide in any::<bool>()
+    fn files_are_as_long_as_the_summary_states_and_wide_labels_have_the_same_values(
+        words in random_words(3)
     ) {
         prop_assume!(!words.is_empty());
         let (dir, mesh) = on_disk(&leaf_set(vec![words]));
         let target = dir.path().join("case/constant/polyMesh");
-        let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
-        let summary = write(&Export { label, ..whole(&mesh) }, &target).unwrap();
+        let summary = write(&whole(&mesh), &target).unwrap();
+        let wide = dir.path().join("wide");
+        fs::create_dir(&wide).unwrap();
+        read(&whole(&mesh)).unwrap().write(&mesh.manifest, true, &wide).unwrap();
+        for name in ["owner", "neighbour", "cellLevel", "side"] {
+            let [narrow] = lists(&target.join(name), [4]);
+            let [wide] = lists(&wide.join(name), [8]);
+            prop_assert_eq!(widened(&narrow), wide);
+        }
+        let narrow = lists(&target.join("faces"), [4, 4]).map(|list| widened(&list));
+        prop_assert_eq!(narrow, lists(&wide.join("faces"), [8, 8]));
+        prop_assert_eq!(lists(&target.join("points"), [24]), lists(&wide.join("points"), [24]));
+        for name in ["owner", "boundary"] {
+            let has = |dir: &Path, bits: &str| {
+                String::from_utf8_lossy(&fs::read(dir.join(name)).unwrap()).contains(bits)
+            };
+            prop_assert!(has(&target, "label=32;") && has(&wide, "label=64;"));
+        }
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
     }
