@@ -31,14 +31,26 @@ log() { printf '[%4ds] %s: %s\n' "$SECONDS" "$(basename "$0")" "$*"; }
 # step NAME COMMAND...: runs COMMAND, and names the step if it fails. What it cost goes to the file CI_COSTS, if that is set: wall time
 # and CPU time in seconds, and the name.
 step() {
-    local name="$1" code=0 spent TIMEFORMAT='%R %U %S'
+    local name="$1" code spent TIMEFORMAT='%R %U %S'
     shift
     log "$name"
-    spent="$(mktemp)"
-    { time "$@" 2>&3 || code=$?; } 3>&2 2>"$spent"
-    [ -z "${CI_COSTS:-}" ] || awk -v name="$name" 'END { printf "%6.0f s %6.0f s  %s\n", $1, $2 + $3, name }' "$spent" >>"$CI_COSTS"
-    rm -f "$spent"
+    # In a shell of its own, which -e or `fail` may end. `||` would switch -e off.
+    set +e
+    { spent="$({ time { (set -e; "$@") >&4 2>&3; }; } 2>&1)"; code=$?; } 3>&2 4>&1
+    set -e
+    [ -z "${CI_COSTS:-}" ] || awk -v name="$name" 'END { printf "%6.0f s %6.0f s  %s\n", $1, $2 + $3, name }' <<<"$spent" >>"$CI_COSTS"
     [ "$code" = 0 ] || fail "$code" "failed: $name"
+}
+
+# background COMMAND...: runs it beside the script, in a process group of its own, with which end_background also ends what it started.
+background() {
+    set -m
+    "$@" </dev/null &
+    set +m
+}
+end_background() {
+    local group
+    for group in $(jobs -p); do kill -- "-$group" 2>/dev/null || true; done
 }
 
 # build_programs: all programs. Those of the profile `dev` are made with the tests: alone, crates would be compiled again without what
