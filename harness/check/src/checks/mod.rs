@@ -101,7 +101,7 @@ fn json(value: &impl Serialize) -> String {
 fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     match promised || subject.case.is_some() {
         true => result.report(format_args!(
-            "{UNKNOWN_SIDES} by its manifest or its array; of another format without --sides, name that array (in p4est: data)"
+            "{UNKNOWN_SIDES} by its manifest or its array; of a mesh in another format, name an array that states them with --sides (in p4est: data)"
         )),
         false => result.lacks(UNKNOWN_SIDES),
     }
