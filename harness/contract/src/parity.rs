@@ -29,25 +29,28 @@ impl Parity {
 
     /// Whether each ray from this point, which is on no facet, crosses an odd number of facets: +x, -x, +y, -y, +z, -z.
     pub fn inside(&self, point: [i64; 3]) -> [bool; 6] {
-        let mut odd = [false; 6];
-        for axis in 0..3 {
-            for &i in self.grids[axis].candidates(project(point, axis)) {
-                match crosses(&self.facets[i as usize], point, axis) {
-                    Some(true) => odd[2 * axis] ^= true,
-                    Some(false) => odd[2 * axis + 1] ^= true,
-                    None => {}
-                }
-            }
-        }
-        odd
+        self.windings(point).map(|winding| winding % 2 != 0)
     }
 
-    /// How many times facets that are wound outward enclose this point, which is on no facet: a ray along +x leaves a body through them.
-    pub fn winding(&self, point: [i64; 3]) -> i64 {
-        let facets = self.grids[0].candidates(project(point, 0)).iter();
-        let facets = facets.map(|&i| &self.facets[i as usize]);
-        let passed = facets.filter(|facet| crosses(facet, point, 0) == Some(true));
-        passed.map(|facet| normal(facet)[0].signum()).sum()
+    /// How many times facets that are wound outward enclose this point, by each of these rays: one leaves a body through them.
+    pub fn windings(&self, point: [i64; 3]) -> [i64; 6] {
+        let along = [0, 1, 2].map(|axis| self.winding(point, axis));
+        std::array::from_fn(|ray| along[ray / 2][ray % 2])
+    }
+
+    /// As [`Self::windings`], by the two rays along one axis.
+    pub fn winding(&self, point: [i64; 3], axis: usize) -> [i64; 2] {
+        let mut windings = [0; 2];
+        for &i in self.grids[axis].candidates(project(point, axis)) {
+            let facet = &self.facets[i as usize];
+            let outward = || normal(facet)[axis].signum();
+            match crosses(facet, point, axis) {
+                Some(true) => windings[0] += outward(),
+                Some(false) => windings[1] -= outward(),
+                None => {}
+            }
+        }
+        windings
     }
 }
 
@@ -189,6 +192,8 @@ mod tests {
         let parity = Parity::new(&[facet]);
         assert_eq!(parity.inside([2, 2, -3]), [false, false, false, false, true, false]);
         assert_eq!(parity.inside([2, 2, 3]), [false, false, false, false, false, true]);
+        assert_eq!(parity.windings([2, 2, -3]), [0, 0, 0, 0, 1, 0]);
+        assert_eq!(parity.windings([2, 2, 3]), [0, 0, 0, 0, 0, -1]);
         // Two copies of a facet cancel.
         assert_eq!(Parity::new(&[facet, facet]).inside([2, 2, 3]), [false; 6]);
     }

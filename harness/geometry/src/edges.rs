@@ -7,11 +7,12 @@
 use contract::case::Facet;
 use contract::lattice::{self, FacetLattice, normal, sorted};
 use serde::Serialize;
+use std::cell::LazyCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::tree::{FacetTree, Point, TOUCHING};
+use super::tree::{Aabb, FacetTree, Point, TOUCHING, from_point};
 
 /// One facet at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -168,16 +169,22 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
 
 /// Facets without area with a corner, or the middle of an edge, on no facet with area, as where a strip of triangles continues elsewhere. One
 /// on the others, as of a T-junction, changes nothing.
-pub fn stray(input: &Input, tree: &FacetTree, first: usize) -> Finding {
+pub fn stray(input: &Input, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Stray);
-    let has_area = |facet: u32| normal(&input.case.facets_lattice[facet as usize]) != [0; 3];
+    let has_area = |facet: &&FacetLattice| normal(facet) != [0; 3];
+    let all = &input.case.facets_lattice;
+    // Without slivers, of which any number may lie on one another.
+    let tree =
+        LazyCell::new(|| FacetTree::new(&all.iter().filter(has_area).copied().collect::<Vec<_>>()));
     let is_off = |[p, q]: [[i64; 3]; 2]| {
         let middle = Point::from_array([0, 1, 2].map(|a| (p[a] + q[a]) as f64 / 2.0));
-        !tree.within(middle, TOUCHING).iter().any(|&facet| has_area(facet))
+        let around = Aabb::from_half_extents(middle, Point::splat(TOUCHING));
+        let touches = |facet| from_point(middle, tree.triangle(facet)) <= TOUCHING;
+        !tree.in_box(&around).any(touches)
     };
-    for (facet, corners) in (0..).zip(&input.case.facets_lattice) {
+    for (facet, corners) in (0..).zip(all).filter(|(_, corners)| !has_area(corners)) {
         let ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));
-        if !has_area(facet) && ends.into_iter().any(is_off) {
+        if ends.into_iter().any(is_off) {
             finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
     }

@@ -86,7 +86,7 @@ pub fn inner_solids(input: &Input, tree: &FacetTree, shells: &Shells) -> BTreeMa
         let step = 3.0 * ROUNDING / n.iter().map(|c| c * c).sum::<f64>().sqrt();
         let behind =
             |a: usize| (facet[0][a] + facet[1][a] + facet[2][a]) / 3 - (step * n[a]).round() as i64;
-        (f, parity.winding(std::array::from_fn(behind)))
+        (f, parity.winding(std::array::from_fn(behind), 0)[0])
     });
     solids.collect()
 }

@@ -33,7 +33,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     let tree = FacetTree::new(&input.case.facets_lattice);
-    findings.push(edges::stray(input, &tree, first));
+    findings.push(edges::stray(input, first));
     let solids = intersections::inner_solids(input, &tree, &shells);
     findings.push(edges::duplicates(input, &edges, &solids, first));
     findings.push(intersections::intersections(input, &tree, &shells, first));

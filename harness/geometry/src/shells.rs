@@ -24,7 +24,7 @@ pub struct Shell {
     volume_sixfold: i128,
     /// Whether it is closed and lies in an odd number of other shells, by all rays, so that its interior is outside.
     is_nested: bool,
-    /// Whether it is wound the other way than the nearest shell around it.
+    /// Whether it is wound the other way than the shells around it, by the sum of all rays: one flipped facet changes nothing.
     is_cavity: bool,
     /// On the lattice, whose coordinates are exact in f64.
     bounds: Aabb,
@@ -89,18 +89,17 @@ impl Shells {
         for &index in &closed {
             // Within an open shell, it may matter which corner: it does not depend on the order of the facets.
             let corner = *own[index].iter().flatten().min().expect("a shell has facets");
-            let mut contains = |other: &usize| {
-                let interior = interiors.entry(*other).or_insert_with(|| Parity::new(&own[*other]));
-                interior.inside(corner) == [true; 6]
+            let winding = |other: usize| {
+                let interior = interiors.entry(other).or_insert_with(|| Parity::new(&own[other]));
+                let windings = interior.windings(corner);
+                windings.iter().all(|n| n % 2 != 0).then(|| windings.iter().sum::<i64>())
             };
             let may_be_in = |other: &usize| all[index].may_be_in(&all[*other]);
             // Not only closed ones: edges at T-junctions and narrow holes are open, too.
-            let around = (0..all.len()).filter(may_be_in).filter(|other| contains(other));
-            let around: Vec<i128> = around.map(|other| all[other].volume_sixfold).collect();
+            let around: Vec<i64> = (0..all.len()).filter(may_be_in).filter_map(winding).collect();
             all[index].is_nested = around.len() % 2 == 1;
-            let nearest =
-                around.into_iter().min_by_key(|volume| (volume.abs(), *volume)).unwrap_or(1);
-            all[index].is_cavity = (nearest < 0) != (all[index].volume_sixfold < 0);
+            let is_inward = around.iter().sum::<i64>() < 0;
+            all[index].is_cavity = is_inward != (all[index].volume_sixfold < 0);
         }
         Self { all, of }
     }

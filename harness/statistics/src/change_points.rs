@@ -103,7 +103,8 @@ struct Model<'a> {
 impl<'a> Model<'a> {
     /// Selects the model of at least four values.
     fn select(values: &'a [f64], floor: f64) -> Self {
-        let count_max = (values.len() / 5).clamp(2, SEGMENTS_MAX) - 1;
+        // Steps of exact counters may be two values apart, also in short series.
+        let count_max = (values.len() / 5).clamp(4, SEGMENTS_MAX) - 1;
         let mut models: Vec<(f64, Self)> = Vec::new();
         for (phi, mean) in
             PHIS.iter().flat_map(|phi| [(*phi, Mean::Constant), (*phi, Mean::Linear)])

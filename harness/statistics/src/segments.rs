@@ -112,17 +112,19 @@ impl<'a> Series<'a> {
     }
 }
 
-/// Returns intervals of lengths n, n / sqrt(2), n / 2, ... down to `least`, each of which overlaps half of its neighbours.
+/// Returns intervals of lengths n, n / sqrt(2), n / 2, ..., each of which overlaps half of its neighbours, and all of length `least`: of two
+/// boundaries half of that apart, no other contains the one without the other.
 fn intervals(n: usize, least: usize) -> impl Iterator<Item = (usize, usize)> {
     let lengths = std::iter::successors(Some(n as f64), |length| Some(length / SQRT_2));
-    lengths.take_while(move |length| *length >= least as f64).flat_map(move |length| {
+    let longer = lengths.take_while(move |length| *length > least as f64).flat_map(move |length| {
         let count = 2 * (n as f64 / length).ceil() as usize - 1;
         let step = (n as f64 - length) / (count - 1).max(1) as f64;
         (0..count).map(move |i| {
             let from = i as f64 * step;
             (from as usize, ((from + length).ceil() as usize).min(n))
         })
-    })
+    });
+    longer.chain((least..=n).map(move |until| (until - least, until)))
 }
 
 #[cfg(test)]
@@ -172,6 +174,7 @@ mod tests {
                 all.iter().any(|&(from, until)| from < at && at < until && until - from <= 7)
             };
             assert!((1..n).all(shortest), "{n}: {all:?}");
+            assert!((4..=n).all(|until| all.contains(&(until - 4, until))), "{n}: {all:?}");
         }
     }
 

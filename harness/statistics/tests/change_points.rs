@@ -153,6 +153,21 @@ fn an_exact_counter_needs_few_values_after_the_change() {
     assert_eq!(places(&values), [30]);
 }
 
+/// However few values an exact counter has between them, and beside them.
+#[test]
+fn steps_close_together_do_not_hide_each_other() {
+    for [middle, last] in [[2000.0, 3000.0], [1100.0, 900.0], [2000.0, 1000.0]] {
+        for (old, count, new) in (5..=60).flat_map(|old| {
+            (2..=4).flat_map(move |count| (2..=10).map(move |new| (old, count, new)))
+        }) {
+            let levels = [vec![1000.0; old], vec![middle; count], vec![last; new]].concat();
+            assert_eq!(places(&levels), [old, old + count], "{middle}, {last}, {new} new values");
+        }
+        let three = [vec![1000.0; 8], vec![middle; 2], vec![last; 2], vec![7000.0; 2]].concat();
+        assert_eq!(places(&three), [8, 10, 12]);
+    }
+}
+
 #[test]
 fn other_values_at_the_ends_of_an_exact_counter_are_no_levels_and_hide_none() {
     for first in [&[500.0][..], &[900.0], &[1200.0], &[900.0, 950.0, 1000.0, 990.0]] {

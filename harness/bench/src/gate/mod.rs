@@ -54,7 +54,7 @@ pub struct GateOptions {
     /// Exit code 3 if a layer or a case of it was left out
     #[arg(long)]
     pub require_layers: bool,
-    /// Accept that meshes differ from the baseline's: then nothing but their correctness is compared, and the gate may hold
+    /// Accept that meshes differ from the baseline's: of cases whose correctness is compared, nothing else must be, and the gate may hold
     #[arg(long, requires = "baseline")]
     pub accept_meshes: bool,
     /// Seed of the order of runs and of the permutation tests
@@ -140,7 +140,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
             }));
         }
         layer.time_s = start.elapsed().as_secs_f64();
-        report.layers.push(layer);
+        report.push(layer);
     }
     Ok(())
 }

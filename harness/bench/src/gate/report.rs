@@ -3,7 +3,8 @@
 //! Invariants, executed by [`GateReport::check_invariants`] before it is printed:
 //! - every case that a layer was asked for has a finding in it, unless the layer was left out or interrupted, and no other case has one;
 //! - a change is that of the two values beside it, and a verdict for the worse or better has the sign of its change;
-//! - a finding that was left out, accepted or is missing compared nothing.
+//! - a finding that was left out, accepted or is missing compared nothing;
+//! - a mesh is accepted only if the correctness of its case was compared.
 //!
 //! [`End::Holds`] carries the number of comparisons, which is not 0: a report that compared nothing of a case that it was asked for
 //! cannot hold.
@@ -188,6 +189,24 @@ impl GateReport {
         }
     }
 
+    /// Appends a layer, the one of correctness before all others: without a comparison there, no mesh of a case is accepted.
+    pub fn push(&mut self, mut layer: Layer) {
+        for finding in &mut layer.findings {
+            if !self.may_contain(finding) {
+                finding.verdict = Verdict::Missing;
+                finding.note += "; it cannot be accepted, as its correctness was not compared";
+            }
+        }
+        self.layers.push(layer);
+    }
+
+    /// Whether the layer of correctness compared anything of the case of a finding that accepts a mesh.
+    fn may_contain(&self, finding: &GateFinding) -> bool {
+        let judges = self.layers.iter().filter(|layer| layer.name == LayerName::Correctness);
+        let mut judged = judges.flat_map(|layer| &layer.findings).filter(|f| f.compared > 0);
+        finding.verdict != Verdict::Accepted || judged.any(|f| f.case == finding.case)
+    }
+
     /// Returns how the gate ends.
     pub fn end(&self) -> End {
         if self.interrupted {
@@ -239,6 +258,7 @@ impl GateReport {
             for finding in &layer.findings {
                 finding.check_invariants();
                 assert!(layer.cases.contains(&finding.case), "a case of the rules: {finding:?}");
+                assert!(self.may_contain(finding), "a mesh that nothing judged: {finding:?}");
             }
             let found = |case: &String| layer.findings.iter().any(|f| f.case == *case);
             let silent = layer.cases.iter().find(|case| !found(case));
@@ -347,6 +367,12 @@ mod tests {
     #[should_panic(expected = "has no finding")]
     fn a_case_without_a_finding_is_noticed() {
         report(vec![layer(&[equal("a")])]).check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "a mesh that nothing judged")]
+    fn an_accepted_mesh_that_nothing_judged_is_noticed() {
+        planted(|finding| *finding = GateFinding::noted("a", "digest", Verdict::Accepted, ""));
     }
 
     #[test]

@@ -140,8 +140,20 @@ fn other_meshes_hold_if_they_are_accepted_and_something_was_compared() {
     let json = fs::read_to_string(fixture.path("gate.json")).unwrap();
     assert_eq!(json.matches("\"verdict\": \"accepted\"").count(), 3, "{json}");
     let nothing = fixture.harness(&format!("{accepting} --candidate other --layers counters"));
-    let why = "INCOMPLETE: nothing was compared";
+    let why = "it cannot be accepted, as its correctness was not compared";
     assert!(nothing.code == 3 && nothing.printed.contains(why), "{}", nothing.printed);
+    // The correctness of one case does not judge the mesh of another.
+    fs::copy(fixture.path("case.toml"), fixture.path("unjudged.toml")).unwrap();
+    let unjudged = "[[case]]\nname = \"unjudged.toml\"\nlayers = [\"counters\", \"time\"]\n";
+    fixture.write("gate.toml", &[rules, unjudged].concat());
+    let partly = fixture.harness(&format!("{accepting} --candidate other"));
+    assert!(partly.code == 3 && partly.printed.contains(why), "{}", partly.printed);
+    for part in
+        ["accepted     case: time", "missing      unjudged: digest", "missing      unjudged: time"]
+    {
+        assert!(partly.printed.contains(part), "{part}: {}", partly.printed);
+    }
+    fixture.write("gate.toml", rules);
     let alone = "gate --engine engine.toml --rules gate.toml --accept-meshes";
     assert_eq!(fixture.harness(alone).code, 2, "nothing to accept");
     // What is no other mesh is judged as ever.

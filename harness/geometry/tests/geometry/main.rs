@@ -217,6 +217,25 @@ fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
         let facets: Vec<_> = nested.iter().enumerate().map(|(i, f)| reversed(i, f, at)).collect();
         assert_eq!(case(&facets, "keep = 'inside'").changes_region, is_solid);
     }
+    // Nor does a flipped facet or a slit of the shell around it, in any place of the root, also if all is inside out, as in a mirror.
+    let flipped = |i: usize| {
+        let facets = nested[..12].iter().enumerate();
+        facets.map(|(at, facet)| reversed(0, facet, &[usize::from(at != i)])).collect()
+    };
+    let slit = cube_with_hole([1.5, 0.5], [1.9, 3.5]);
+    for around in (0..12).map(flipped).chain([slit]) {
+        for is_solid in [true, false] {
+            let inner = |facet| reversed(0, facet, &[usize::from(is_solid)]);
+            let facets =
+                [&around[..], &nested[12..].iter().map(inner).collect::<Vec<_>>()].concat();
+            let far = facets.iter().map(|f| f.map(|v| v.map(|c| 15.0 - c / 8.0))).collect();
+            for facets in [facets, far] {
+                let found = case(&facets, "keep = 'inside'");
+                let nested = found.finding(Kind::Nested).unwrap();
+                assert_eq!((nested.count, nested.count_changing), (1, is_solid.into()), "{found}");
+            }
+        }
+    }
     assert!(case(&nested, "seeds = [[2.0, 2.0, 2.0]]").changes_region);
     assert!(!case(&nested, &format!("enclosed = 'keep'\n{beyond}")).changes_region);
     // Where the rays of seeds are not counted, copies and overlaps do not matter to a flow beyond the body.
@@ -526,6 +545,17 @@ fn gaps_and_walls_of_shells_that_are_inside_out_are_found() {
     assert_eq!(counts(&diagnosis(angle.clone(), Some(0.25))), []);
     let beside = [angle, inward(cuboid([2.0; 3], [3.0; 3]))].concat();
     assert_eq!(counts(&diagnosis(beside, Some(0.25))), [(Kind::InsideOut, 1)]);
+}
+
+/// In the time of one search each: slivers on one edge, which fan from its end, are 10^8 pairs.
+#[test]
+fn many_slivers_on_one_edge_are_not_compared_with_each_other() {
+    let at = |i: u16| [f32::from(i) / 4096.0, 0.0, 0.0];
+    let fan = (1..16_384).map(|i| [[0.0; 3], at(i), at(i + 1)]);
+    let start = std::time::Instant::now();
+    let found = diagnosis(cube().into_iter().chain(fan).collect(), Some(0.25));
+    assert_eq!((counts(&found), found.shells.closed), (vec![], 1));
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
 }
 
 /// In the time of one pair of facets each: 10^9 pairs take minutes.
