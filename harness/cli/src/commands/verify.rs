@@ -4,7 +4,8 @@ use crate::options::{EngineArguments, Output, examples};
 use crate::output::put_forms;
 use clap::Args;
 use contract::failure::Result;
-use report::verification::{json, junit, markdown, table};
+use report::pretty;
+use report::verification::{junit, markdown, table};
 use run::verify::options::Options;
 use run::verify::verify;
 
@@ -39,9 +40,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             (out("table.txt").as_deref(), &|| shown.clone()),
             (out("report.md").as_deref(), &|| page.clone()),
             (out("junit.xml").as_deref(), &|| junit(&report)),
-            (out("report.json").as_deref(), &|| json(&report)),
+            (out("report.json").as_deref(), &|| pretty(&report)),
             (arguments.junit.as_deref(), &|| junit(&report)),
-            (arguments.json.as_deref(), &|| json(&report)),
+            (arguments.json.as_deref(), &|| pretty(&report)),
         ],
         Some(&page),
     )
