@@ -61,6 +61,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let code = match arguments.show {
         true => {
             let mut lines = super::report::read(&[record])?;
+            // A record may be of --engine.
+            study.series.iter_mut().for_each(|series| series.engines.clear());
             lines.retain(|line| study.unasked(line).is_none());
             publish(&study, &study::judged(&study, &lines), &lines, report)?
         }
@@ -221,17 +223,15 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     fn of_series(setup: &Setup) -> [&str; 3] {
         [&setup.engine, &setup.experiment, &setup.case]
     }
-    let results = lines.iter().filter(|line| is_result(line)).filter_map(Line::run);
-    let runs: HashSet<_> = results.map(|run| of_series(&run.setup)).collect();
-    let mut left_out = lines.iter().filter_map(|line| match &line.entry {
-        // A row says itself that it was left out.
-        Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != TARGETS),
-        _ => None,
-    });
+    let results = lines.iter().filter(|line| is_result(line)).filter_map(Line::setup);
+    let runs: HashSet<_> = results.map(of_series).collect();
+    let left = lines.iter().filter(|line| matches!(line.entry, Entry::LeftOut(_)));
+    // A row says itself that it was left out.
+    let mut left = left.filter_map(Line::setup).map(of_series).filter(|of| of[1] != TARGETS);
     if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let without = left_out.find(|of| !runs.contains(of));
+    let without = left.find(|of| !runs.contains(of));
     let has_series = !study.series.is_empty();
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
