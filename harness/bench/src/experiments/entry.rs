@@ -199,7 +199,7 @@ fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
 }
 
 /// How far the clock of a program may be from that of the harness, and from those of its phases.
-const CLOCKS_S: f64 = 0.01;
+pub(super) const CLOCKS_S: f64 = 0.01;
 
 /// How far a sum may be from that of so many stored values.
 fn rounding(count: usize, sum: f64) -> f64 {

@@ -191,7 +191,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
 #[test]
 fn the_last_build_and_the_last_network_are_those_of_an_archive() {
     let fixture = scripted();
-    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
     fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
     fixture
         .write("study.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [1]\n");
@@ -280,7 +280,7 @@ fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
 #[test]
 fn an_edited_case_is_another_one() {
     let fixture = scripted();
-    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
     fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
     let case = "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'sphere'\nfacets = 80\n";
     fixture.write(
