@@ -57,8 +57,7 @@ pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
     let is_ours = first.starts_with(b"{") && (!first.ends_with(b"\n") || is_line(first));
     // A crash may leave zeros where the last line was to be.
     if !is_ours || !matches!(last.first(), None | Some(b'{' | 0)) {
-        let why =
-            "it does not consist of JSON lines, so nothing is appended to it: give another file";
+        let why = "it does not consist of JSON lines, so nothing is appended: give another file";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     if is_line(last) {

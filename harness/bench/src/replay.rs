@@ -32,12 +32,12 @@ pub struct Expected {
     pub seconds_once: f64,
     /// The values, run by run.
     pub values: Vec<Value>,
-    /// The runs that failed or were left out, and so are not repeated, a sentence each.
+    /// The runs that failed, were left out or never made, and so are not repeated, a sentence each.
     #[serde(skip)]
     pub missing: Vec<String>,
-    /// The runs.
+    /// The runs, and how often each was repeated.
     #[serde(skip)]
-    setups: Vec<Setup>,
+    pub runs: Vec<(Setup, usize)>,
 }
 
 /// A quantity of a run.
@@ -84,19 +84,19 @@ impl Expected {
         if groups.all.is_empty() {
             return Err(Failure::missing("the record has no run that could be repeated"));
         }
-        let runs = || lines.iter().filter_map(Line::run);
-        let seconds = runs().map(|run| run.time_launch_s).sum();
-        let warm_ups = runs().filter(|run| run.warm_up).map(|run| run.time_launch_s);
+        let all = || lines.iter().filter_map(Line::run);
+        let seconds = all().map(|run| run.time_launch_s).sum();
+        let warm_ups = all().filter(|run| run.warm_up).map(|run| run.time_launch_s);
         let longest =
             |group: &Group| group.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
         let seconds_once = warm_ups.chain(groups.all.iter().map(longest)).sum();
         let named = |group: &Group| values(group.setup.to_string(), &groups, group);
         let values = groups.all.iter().flat_map(named).collect();
-        let setups = groups.all.iter().map(|group| group.setup.clone()).collect();
+        let runs = groups.all.iter().map(|group| (group.setup.clone(), group.runs.len())).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
         let missing = groups.missing;
-        let expected = Self { schema, commit, seconds, seconds_once, values, missing, setups };
+        let expected = Self { schema, commit, seconds, seconds_once, values, missing, runs };
         expected.check_invariants();
         Ok(expected)
     }
@@ -127,14 +127,10 @@ impl Expected {
         assert!(self.seconds_once <= self.seconds + 1e-6, "one run takes longer than all");
     }
 
-    /// The name of the run that a run repeats: one of another spacing, too, as programs of other meshes come to another one for a number of cells.
+    /// The name of the run that a run repeats.
     fn name(&self, of: &Setup) -> String {
-        let repeats = |setup: &&Setup| {
-            let is_close = (0.71..1.41).contains(&(setup.spacing_min / of.spacing_min));
-            is_close && Setup { spacing_min: of.spacing_min, ..(*setup).clone() } == *of
-        };
-        let same = self.setups.iter().find(|setup| *setup == of);
-        same.or_else(|| self.setups.iter().find(repeats)).unwrap_or(of).to_string()
+        let close = self.runs.iter().map(|(setup, _)| setup).filter(|setup| setup.is_close(of));
+        close.min_by_key(|setup| *setup != of).unwrap_or(of).to_string()
     }
 
     /// Compares with a record of the repetition.

@@ -65,8 +65,7 @@ impl Table {
         let mut text =
             line(self.columns.iter().map(|title| escaped(&title.replace('\n', " "))).collect());
         text += &line((0..self.columns.len()).map(rule).collect());
-        let rows =
-            self.rows.iter().map(|row| line(row.iter().map(|field| escaped(field)).collect()));
+        let rows = self.rows.iter().map(|row| line(row.iter().map(|of| escaped(of)).collect()));
         text + &rows.collect::<String>()
     }
 

@@ -60,8 +60,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
 
 /// Each check is in one row.
 fn check_rows(rows: &[Vec<String>], report: &Report) {
-    let sum =
-        |column: usize| rows.iter().map(|row| row[column].parse::<usize>().unwrap_or(0)).sum();
+    let sum = |column: usize| rows.iter().map(|of| of[column].parse::<usize>().unwrap_or(0)).sum();
     let shown = Tally { pass: sum(5), fail: sum(6), left_out: sum(7) };
     assert_eq!(shown, report.tally(), "checks in the rows of the table, and in the report");
 }

@@ -64,6 +64,15 @@ impl Line {
         Some((&self.session, *network))
     }
 
+    /// Returns the parameters of the line's run, with or without a result.
+    pub fn setup(&self) -> Option<&Setup> {
+        match &self.entry {
+            Entry::Run(run) => Some(&run.setup),
+            Entry::Failure(without) | Entry::LeftOut(without) => Some(&without.setup),
+            _ => None,
+        }
+    }
+
     /// Returns the run of the line, if it has one.
     pub fn run(&self) -> Option<&Run> {
         let Entry::Run(run) = &self.entry else { return None };
@@ -190,7 +199,7 @@ fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
 }
 
 /// How far the clock of a program may be from that of the harness, and from those of its phases.
-const CLOCKS_S: f64 = 0.01;
+pub(super) const CLOCKS_S: f64 = 0.01;
 
 /// How far a sum may be from that of so many stored values.
 fn rounding(count: usize, sum: f64) -> f64 {
@@ -307,6 +316,12 @@ impl Setup {
     pub fn serial(case: &str, spacing_min: f64, layer_cells_min: u32) -> Self {
         let (engine, case) = ("mesher".to_owned(), case.to_owned());
         Self { engine, case, spacing_min, layer_cells_min, ranks: 1, ..Self::default() }
+    }
+
+    /// Whether it repeats another one, maybe at another spacing, as programs of other meshes come to another one for a number of cells.
+    pub(crate) fn is_close(&self, of: &Self) -> bool {
+        let is_near = (0.71..1.41).contains(&(self.spacing_min / of.spacing_min));
+        is_near && Self { spacing_min: of.spacing_min, ..self.clone() } == *of
     }
 
     /// Returns partitioner and weights, or `default`.

@@ -1,7 +1,7 @@
 //! Measured runs: one run of a setup, as a line of the record, and whether it is worth starting: a slow program is not started on a mesh that
 //! it would not finish.
 
-use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
+use super::entry::{CLOCKS_S, Comm, Line, Phase, Run, Setup, Spread};
 use super::machine;
 use crate::shown;
 use check::audit::audit_against;
@@ -65,7 +65,11 @@ impl Runner<'_> {
              ranks or more cells";
         Failure::unless(setup.partitioner != METIS || !not_metis, why)?;
         let time_wall_s = report.time_wall_s.unwrap_or(finished.time_wall_s);
-        let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
+        let is_by_rank = report.counters.values().all(|of| of.len() <= setup.ranks);
+        Failure::unless(is_by_rank, "its run report has a counter of more numbers than ranks")?;
+        // Those of rank 0 alone say nothing of the others.
+        let counters = report.counters.iter().filter(|(_, of)| of.len() == setup.ranks);
+        let counters = counters.map(|(name, of)| (name.clone(), spread(of)));
         let run = Run {
             program: machine::digest_of(engine.files()),
             repeat: repeat.unwrap_or(0),
@@ -88,7 +92,10 @@ impl Runner<'_> {
             setup: setup.clone(),
         };
         let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
-        Failure::unless(run.is_possible(), why)?;
+        // As of milliseconds for seconds. Ranks within one process run in turn. Each may have threads, and a limit of cores be a fraction.
+        let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
+        let most_s = (1 + machine::cores()) as f64 * (run.time_launch_s + CLOCKS_S);
+        Failure::unless(run.is_possible() && busy_s <= most_s * node_count() as f64, why)?;
         Ok(run)
     }
 }
@@ -239,17 +246,49 @@ mod tests {
     #[test]
     fn useful_time_is_cpu_time_outside_calls() {
         let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 0.009, "peak_rss_bytes": [70, 70],
-            "counters": {"leaves": [30, 50]}, "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0],
-            "time_comm_wall_s": [1.0, 1.0], "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
+            "counters": {"leaves": [30, 50]}, "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [0.02, 0.01],
+            "time_comm_wall_s": [1.0, 1.0], "time_comm_cpu_s": [0.005, 0.011], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
         let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
-        assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
-        assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
-        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
-        assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
+        assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (0.015, 0));
+        assert_eq!(run.useful_s.by_rank, [0.015, 0.0]);
+        assert_eq!(run.phases[0].useful_s.by_rank, [0.015, 0.0]);
+        assert_eq!((run.useful_s.sum, run.useful_s.max), (0.015, 0.015));
         assert_eq!((run.phases[0].wall_s.max, run.phases[0].message_bytes.sum), (4.5, 24.0));
         // A simulated rank reports its part of the one process.
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
+    }
+
+    /// Those of rank 0 alone, or of all ranks together, say nothing of each.
+    #[test]
+    fn counters_are_of_every_rank() {
+        let counted = |of: &str, comm| {
+            let report = format!(
+                r#"{{"cells": 80, "digest": "00", "counters": {{"leaves": {of}}},
+                "phases": [{{"name": "all", "time_cpu_s": [0.001, 0.001]}}]}}"#
+            );
+            let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
+            let run = scripted(&format!("echo '{report}' > $2"), REPORTS, comm);
+            run.map(|run| run.counters.get("leaves").map(|of| of.lambda(run.setup.ranks)))
+        };
+        assert_eq!(counted("[30, 50]", Comm::Sim), Ok(Some(1.25)));
+        assert_eq!(counted("[80]", Comm::Sim), Ok(None));
+        let why = "a counter of more numbers than ranks";
+        assert!(counted("[30, 25, 25]", Comm::Sim).unwrap_err().contains(why));
+    }
+
+    /// As of a program that takes milliseconds for seconds.
+    #[test]
+    fn phases_take_no_more_cpu_time_than_all_cores_have() {
+        let with = |cpu_s: &str, comm| {
+            let phases = format!(r#"[{{"name": "all", "time_cpu_s": {cpu_s}}}]"#);
+            let report = format!(r#"{{"cells": 8, "digest": "00", "phases": {phases}}}"#);
+            scripted(&format!("echo '{report}' > $2"), REPORTS, comm)
+        };
+        assert!(with("[0.01]", Comm::Solo).is_ok());
+        for (cpu_s, comm) in [("[5e3]", Comm::Solo), ("[0.01, 5e3]", Comm::Sim)] {
+            assert!(with(cpu_s, comm).unwrap_err().contains("numbers that no run can have"));
+        }
     }
 
     #[test]
@@ -289,16 +328,16 @@ mod tests {
     #[test]
     fn reported_time_and_memory_take_precedence() {
         let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 0.0075, "peak_rss_bytes": [3, 4],
-            "phases": [{"name": "all", "time_cpu_s": [2.0, 1.0]}]}"#;
+            "phases": [{"name": "all", "time_cpu_s": [0.02, 0.01]}]}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
         assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (0.0075, 7.0));
-        assert_eq!((run.useful_s.by_rank, run.phases[0].useful_s.max), (vec![2.0, 1.0], 2.0));
+        assert_eq!((run.useful_s.by_rank, run.phases[0].useful_s.max), (vec![0.02, 0.01], 0.02));
     }
 
     #[test]
     fn phases_of_fewer_ranks_or_without_cpu_times_are_not_used_and_no_digest_is_needed() {
         let report = |key: &str| {
-            let phases = format!(r#"[{{"name": "all", "{key}": [2.0]}}]"#);
+            let phases = format!(r#"[{{"name": "all", "{key}": [0.002]}}]"#);
             let json = format!(r#"{{"cells": 8, "time_wall_s": 0.0075, "phases": {phases}}}"#);
             format!("echo '{json}' > $2")
         };

@@ -208,8 +208,7 @@ impl Groups {
             }
         }
         let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
-        let all: Vec<Group> =
-            by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
+        let all: Vec<Group> = by_setup.filter_map(|(setup, of)| Group::of(setup, &of)).collect();
         let is_of = |g: &Group, s: &Setup| (&g.setup.engine, &g.setup.case) == (&s.engine, &s.case);
         let as_named = |(at, session, setup, why): (usize, &String, &Setup, String)| {
             let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {
@@ -332,33 +331,28 @@ impl Groups {
     }
 }
 
-/// What the runs on a mesh report of it: facets, cells, digest; empty where none of them does.
-pub(crate) type Meshes = HashMap<String, [String; 3]>;
+/// What the runs on a mesh report of it: facets, cells or digest.
+pub(crate) type Meshes = HashMap<String, String>;
 
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
 pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Option<String> {
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
     let lacks = |of: &str| lacks.get(engine).is_some_and(|all| all.iter().any(|what| what == of));
-    let mut mesh = format!("{} {} {:e} {}", s.engine, case_of(s), s.spacing_min, s.layer_cells_min);
+    let given = format!("{} {:e} {}", case_of(s), s.spacing_min, s.layer_cells_min);
+    let mut mesh = format!("{} {given}", s.engine);
     if lacks(EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
-    let [facets, cells] = [run.facets, run.cells].map(|count| match count {
-        0 => String::new(),
-        _ => count.to_string(),
-    });
-    let known = meshes.entry(mesh).or_default();
-    let names = ["number of facets", "number of cells", "digest"];
-    let all = names.into_iter().zip(known).zip([facets, cells, run.digest.clone()]);
-    // Any mesh is of the facets that were given.
-    for ((what, first), here) in all.take(if lacks(EQUAL_RUNS) { 1 } else { 3 }) {
-        if first.is_empty() {
-            *first = here;
-        } else if !here.is_empty() && *first != here {
-            return Some(format!(
-                "its mesh has the {what} {here}, and that of an earlier run {first}"
-            ));
+    let [facets, cells] = [run.facets, run.cells].map(|count| count.to_string());
+    let of_mesh = [("number of cells", &mesh, cells), ("digest", &mesh, run.digest.clone())];
+    // Any mesh, of any program, is of the facets that were given.
+    let all = [("number of facets", &given, facets)].into_iter().chain(of_mesh);
+    let all = all.take(if lacks(EQUAL_RUNS) { 1 } else { 3 });
+    for (what, of, here) in all.filter(|(.., here)| !["", "0"].contains(&here.as_str())) {
+        let first = meshes.entry(format!("{what} {of}")).or_insert(here.clone());
+        if *first != here {
+            return Some(format!("its mesh has the {what} {here}, that of an earlier run {first}"));
         }
     }
     None

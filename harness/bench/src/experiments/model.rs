@@ -266,8 +266,7 @@ impl Model {
         let own = || samples.iter().filter(|sample| sample.geometry == 0);
         let cells = own().map(|sample| sample.at.cells).fold(0.0, f64::max);
         let most = At { cells, ..own().next_back()?.at };
-        let is_counter =
-            |key: &&Key| key.0 == Kind::Counter && own().all(|s| s.of.contains_key(key));
+        let is_counter = |of: &&Key| of.0 == Kind::Counter && own().all(|s| s.of.contains_key(of));
         let counters = own().next()?.of.keys().filter(is_counter).cloned();
         let phases = phases.iter().map(|phase| (Kind::Phase, phase.name.clone()));
         let geometries = samples.iter().map(|s| s.geometry + 1).max()?;

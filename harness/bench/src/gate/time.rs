@@ -52,8 +52,7 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
         measured.extend(real.map(|ranks| (case, ranks, rounds(bench, case, ranks, false))));
     }
     // All quantities of all cases are tested together.
-    let mut all: Vec<&mut Quantity> =
-        measured.iter_mut().flat_map(|of| &mut of.2).flatten().collect();
+    let mut all: Vec<_> = measured.iter_mut().flat_map(|of| &mut of.2).flatten().collect();
     let p_values = adjusted(&all.iter().map(|quantity| quantity.found.p).collect::<Vec<f64>>());
     all.iter_mut().zip(p_values).for_each(|(quantity, p)| quantity.found.p = p);
     for (case, ranks, times) in measured {
@@ -65,9 +64,7 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
             Ok(both.map(|(first, again)| first.confirmed_by(again, rules)).collect())
         });
         match confirmed {
-            Ok(times) => {
-                layer.findings.extend(times.iter().map(|of| of.finding(&case.name, rules)))
-            }
+            Ok(all) => layer.findings.extend(all.iter().map(|of| of.finding(&case.name, rules))),
             Err(_) if interrupt::requested() => {}
             Err((verdict, note)) => {
                 let metric = format!("{}time", prefix(ranks));

@@ -44,8 +44,7 @@ pub fn reduce(trial: Trial, fails: Fails) -> Trial {
 
 /// Returns the size of a trial as text.
 pub fn size(trial: &Trial) -> String {
-    let number =
-        |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
+    let number = |of: &str| trial.case.table.get(of).map_or("default".to_owned(), Value::to_string);
     let [facets, boxes, seeds, _] = trial.counts();
     let (spacing, n) = (number("spacing_min"), number("layer_cells_min"));
     format!(

@@ -5,11 +5,15 @@
 
 use super::measure::{self, Input, Measure};
 use crate::experiments::cases::grown;
-use crate::experiments::entry::{Comm, Entry, Line, Setup, TARGETS};
+use crate::experiments::entry::{Comm, Line, Setup, TARGETS};
 use crate::order::distinct;
 use crate::{name_of, read_toml, refuse};
+use contract::case::Case;
+use contract::failure::Failure;
 use run::engine::description::{Description, is_own};
+use run::engine::paths::Paths;
 use run::engine::report::one_or_many;
+use run::engine::runner::label;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -38,6 +42,9 @@ pub struct Study {
     /// Directory of the file; paths are relative to it.
     #[serde(skip)]
     pub directory: PathBuf,
+    /// In a replay, the runs that the archive has, and how often; no others are executed.
+    #[serde(skip)]
+    pub repeated: Option<Vec<(Setup, usize)>>,
 }
 
 /// A mesh.
@@ -237,16 +244,43 @@ impl Study {
         *setup == run.setup(spacing_min.unwrap_or(spacing), layer_cells_min.unwrap_or(n))
     }
 
-    /// Returns the setup of a line that this study does not ask for, whatever the program.
+    /// Returns the setup of a line that this study does not ask for.
     pub fn unasked<'a>(&self, line: &'a Line) -> Option<&'a Setup> {
-        let (setup, cells) = match &line.entry {
-            Entry::Run(run) => (&run.setup, Some(run.cells).filter(|_| is_own(&run.setup.engine))),
-            Entry::Failure(without) | Entry::LeftOut(without) => (&without.setup, None),
-            _ => return None,
-        };
+        let setup = line.setup()?;
+        let cells = line.run().filter(|_| is_own(&setup.engine)).map(|run| run.cells);
         let is_of_series = self.series.iter().any(|series| series.asks_for(setup, cells));
         let is_of_row = || self.run.keys().any(|name| self.is_run(name, setup));
         (!is_of_series && !is_of_row()).then_some(setup)
+    }
+
+    /// Returns what this study asks for and these lines have not, a sentence each. Spacings are found in execution, so meshes are counted.
+    ///
+    /// # Errors
+    /// If a case cannot be read.
+    pub(super) fn lacking(&self, lines: &[Line], paths: &Paths) -> Result<Vec<String>, Failure> {
+        let made = lines.iter().filter(|line| line.run().is_none_or(|run| !run.warm_up));
+        let mut made = distinct(made.filter_map(Line::setup));
+        let is_made = |name: &&String| made.iter().any(|setup| self.is_run(name, setup));
+        let rows = self.row.iter().flat_map(Row::runs).filter(|name| !is_made(name));
+        let mut lacks = distinct(rows.map(|name| format!("the run {name}")));
+        let mut asked = Vec::new();
+        for (series, cells) in self.series.iter().flat_map(Series::sizes) {
+            let case = Case::read(&paths.catalogue.case_file(&series.case, &self.directory)?)?;
+            for name in &series.engines {
+                // One that cannot be read here is taken to be serial.
+                let on = series.layouts(&Description::find(name, paths).unwrap_or_default(), false);
+                let all = series.setups(&label(name), cells, case.layer_cells_min, &on);
+                asked.extend(all.into_iter().map(|setup| (setup, cells)));
+            }
+        }
+        for (asked, _) in distinct(asked) {
+            let plain = |of: &Setup| Setup { spacing_min: 0.0, ..of.clone() };
+            match made.iter().position(|made| plain(made) == plain(&asked)) {
+                Some(at) => drop(made.remove(at)),
+                None => lacks.push(plain(&asked).to_string().replace(" 0e0", "")),
+            }
+        }
+        Ok(lacks.iter().map(|of| format!("{of} is not in the record")).collect())
     }
 
     fn check(&self) -> Result<(), String> {
@@ -323,6 +357,9 @@ impl Study {
 /// Weights and partitioner of a run, empty to leave the choice to the program.
 pub(super) type Choice = (&'static str, &'static str);
 
+/// How ranks communicate, and their number.
+type Ranks = (Comm, usize);
+
 /// The choices of the experiment on weights. `rebalance` with METIS is identical to `area`.
 const CHOICES: [Choice; 6] = [
     ("", "paper"),
@@ -340,7 +377,7 @@ impl Series {
         self.facets.map_or(case.clone().into(), |facets| grown(&case, facets))
     }
 
-    /// Whether it is a run of this series, or a serial one in place of it. `cells` are those of the mesh, if that is ours: meshes of others may be far from
+    /// Whether it is a run of this series, of any program if that names none, or a serial one in place of it. `cells` are those of the mesh, if that is ours: meshes of others may be far from
     /// what was asked for, and where the number of cells jumps with the spacing, ours are not close either.
     fn asks_for(&self, setup: &Setup, cells: Option<u64>) -> bool {
         let has_ranks = match setup.comm {
@@ -358,23 +395,50 @@ impl Series {
             && (self.layers.is_empty() || self.layers.contains(&setup.layer_cells_min))
             && (self.cells.is_empty() || self.cells.iter().any(fits))
             && self.choices().contains(&division)
+            && (self.engines.is_empty() || self.engines.iter().any(|of| label(of) == setup.engine))
+    }
+
+    /// The runs of a program at one size, in units of the finest spacing, on these ranks; `n` is that of the case.
+    pub(super) fn setups(&self, of: &str, cells: Option<f64>, n: u32, on: &[Ranks]) -> Vec<Setup> {
+        use Experiment::{Spacing, Strong, Weights};
+        // Coarser by factors of two, while there are enough cells to measure.
+        let least = if self.experiment == Spacing { 1e5 } else { f64::INFINITY };
+        let halvings = (cells.unwrap_or_default() / least).log(4.0).max(0.0) as i32;
+        let series_cells = cells.filter(|_| !matches!(self.experiment, Strong | Weights));
+        let layers = if self.layers.is_empty() { vec![n] } else { self.layers.clone() };
+        let each = layers.iter().flat_map(|n| on.iter().map(move |layout| (*n, *layout)));
+        let each = each.flat_map(|at| (0..=halvings).rev().map(move |k| (at, 2f64.powi(k))));
+        let of_choice = |((n, (comm, ranks)), spacing), (weights, partitioner): &Choice| Setup {
+            experiment: name_of(&self.experiment),
+            engine: of.to_owned(),
+            ranks,
+            comm,
+            weights: (*weights).to_owned(),
+            partitioner: (*partitioner).to_owned(),
+            series_cells,
+            ..Setup::serial(&self.name(), spacing, n)
+        };
+        each.flat_map(|at| self.choices().iter().map(move |of| of_choice(at, of))).collect()
+    }
+
+    /// Each series that it is, with its cells.
+    pub(super) fn sizes(&self) -> impl Iterator<Item = (&Self, Option<f64>)> {
+        let own = self.cells.is_empty().then_some(None);
+        self.cells.iter().copied().map(Some).chain(own).map(move |cells| (self, cells))
     }
 
     /// Returns the partitions that are compared.
     pub(super) fn choices(&self) -> &'static [Choice] {
-        match self.experiment {
-            Experiment::Weights => &CHOICES,
-            _ => &[("", "")],
-        }
+        if self.experiment == Experiment::Weights { &CHOICES } else { &[("", "")] }
     }
 
     /// Returns the ranks on which an engine is run: those of the series that it offers. A serial run replaces ranks on MPI that
     /// are missing; nothing can replace the ranks of experiments about ranks.
-    pub(super) fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<(Comm, usize)> {
+    pub(super) fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<Ranks> {
         let has_mpi = !engine.run.parallel.is_empty() && !no_mpi;
         let sim = self.sim.iter().filter(|_| !engine.run.simulated.is_empty());
         let mpi = self.mpi.iter().filter(|_| has_mpi);
-        let mut all: Vec<(Comm, usize)> =
+        let mut all: Vec<Ranks> =
             sim.map(|r| (Comm::Sim, *r)).chain(mpi.map(|r| (Comm::Mpi, *r))).collect();
         match self.experiment {
             Experiment::Weights if !is_own(&engine.name) => all.clear(),

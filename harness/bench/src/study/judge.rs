@@ -5,7 +5,7 @@
 
 use super::file::{Row, Study};
 use super::measure::Sample;
-use crate::experiments::entry::{Entry, Line, Network, NoResult, Run, Setup};
+use crate::experiments::entry::{Entry, Line, Network, Run, Setup};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{ABOVE_ONE, DISTURBED, Efficiency, above_one};
 use crate::name_of;
@@ -82,10 +82,8 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     // A run that failed is not repeated: it failed if its last line says so, whatever other repetitions took.
     let failure = |name: &String| {
-        let is_of = |line: &&Line| match &line.entry {
-            Entry::Failure(NoResult { setup, .. }) => study.is_run(name, setup),
-            entry => matches!(entry, Entry::Run(run) if study.is_run(name, &run.setup)),
-        };
+        let is_run = |line: &&Line| line.setup().is_some_and(|of| study.is_run(name, of));
+        let is_of = |line: &&Line| is_run(line) && !matches!(line.entry, Entry::LeftOut(_));
         let Entry::Failure(failed) = &lines.iter().rfind(is_of)?.entry else { return None };
         Some(format!("run {name} failed: {}", failed.why))
     };
@@ -174,7 +172,7 @@ impl Judged {
 mod tests {
     use super::super::measure::MEASURES;
     use super::*;
-    use crate::experiments::entry::{ASSUMED, Comm, Machine, Session, TARGETS};
+    use crate::experiments::entry::{ASSUMED, Comm, Machine, NoResult, Session, TARGETS};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;

@@ -5,6 +5,7 @@ use super::file::Series;
 use super::judge::of_last_origin;
 use crate::experiments::cases::Base;
 use crate::experiments::entry::{Line, Run};
+use crate::experiments::machine::digest_of;
 use crate::{name_of, read_toml};
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
@@ -58,11 +59,12 @@ pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<()> {
     put(&out.join(STUDY), table.to_string().as_bytes())
 }
 
-/// Requires that a study made a record: that it asks for all of its runs, and that the last of them were of the cases and geometries that it names.
+/// Requires that a study made a record: that it asks for all of its runs, and that the last of them were of the cases, geometries and scripts
+/// that it names. Returns the runs that it asks for and the record lacks, a sentence each.
 ///
 /// # Errors
-/// One sentence with a run of another study, or with a case that is not the same.
-pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<()> {
+/// One sentence with a run of another study, or with a case or a program that is not the same.
+pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<String>> {
     if let Some(setup) = lines.iter().find_map(|line| study.unasked(line)) {
         let why = "the record has a run that the study does not ask for";
         return Err(Failure::input(format!("{why}, {setup}: give the study that made it")));
@@ -83,7 +85,16 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<()> 
         let why = "rules or geometry are not those of the record's runs";
         Failure::unless(base.inputs == inputs, format!("{case}: {why}"))?;
     }
-    Ok(())
+    for name in study.engines().iter().filter(|name| name.ends_with(".toml")) {
+        let Ok(engine) = Engine::find(name, None, paths) else { continue };
+        // Installed programs differ between machines.
+        let is_packaged = engine.files().iter().all(|of| of.starts_with(&engine.description.here));
+        let digest = digest_of(engine.files());
+        let is_other = |run: &Run| run.setup.engine == engine.label() && run.program != digest;
+        let is_other = is_packaged && last.iter().filter_map(Line::run).any(is_other);
+        Failure::unless(!is_other, format!("{name}: its program is not that of the record"))?;
+    }
+    study.lacking(&last, paths)
 }
 
 /// Copies an engine file with the program and the scripts beside it. What it runs from elsewhere is of the machine.
@@ -124,6 +135,8 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiments::entry::{Comm, Entry, NoResult, Setup};
+    use crate::testing::{line, run};
     use contract::catalogue::Catalogue;
 
     fn paths(place: &Path) -> Paths {
@@ -178,6 +191,101 @@ mod tests {
         let study = Study::read(&at("there").join(STUDY)).unwrap();
         let engine = Engine::find(&study.series[0].engines[1], None, &Paths::find()).unwrap();
         assert!(engine.files().contains(&at("there/bin/mesh.sh").canonicalize().unwrap()));
+    }
+
+    /// The lines of runs of the generated case `ball`.
+    fn of_ball(runs: &[Run]) -> Vec<Line> {
+        let of = |run: &Run| {
+            let setup = Setup { case: "ball".into(), ..run.setup.clone() };
+            line(Entry::Run(Box::new(Run { setup, ..run.clone() })))
+        };
+        runs.iter().map(of).collect()
+    }
+
+    const BALL: &str = "spacing_min = 0.1\n[generator]\nshape = \"sphere\"\nfacets = 80\n";
+
+    #[test]
+    fn runs_that_a_record_lacks_are_named() {
+        let place = tempfile::tempdir().unwrap();
+        fs::write(place.path().join("ball.toml"), BALL).unwrap();
+        let series = |of: &str| format!("[[series]]\ncase = 'ball.toml'\nexperiment = {of}\n");
+        let strong = series("'strong'\ncells = [1e4, 1e5]\nsim = [1, 2]");
+        let rows = "[mesh.a]\ncase = 'ball.toml'\n[run]\none = { mesh = 'a' }\ntwo = { mesh = 'a' }\n\
+                    [[row]]\nname = 'r'\nrun = 'one'\nmeasure = 'seconds'\n";
+        let file = place.path().join("s.toml");
+        let spacing = series("'spacing'\ncells = [4e5]");
+        fs::write(&file, strong.clone() + &strong + &spacing + rows).unwrap();
+        let study = Study::read(&file).unwrap();
+        let mesh = |ranks: usize, spacing_min: f64, cells| {
+            let mut run = run(Comm::Sim, cells, &[("a", &vec![1.0; ranks])]);
+            (run.setup.weights, run.setup.partitioner) = Default::default();
+            Run { setup: Setup { spacing_min, ..run.setup }, ..run }
+        };
+        let spaced = |spacing_min: f64| {
+            let mut run = mesh(1, spacing_min, 400_000);
+            (run.setup.experiment, run.setup.comm) = ("spacing".into(), Comm::Solo);
+            run.setup.series_cells = Some(4e5);
+            run
+        };
+        let mut row = mesh(1, 0.1, 9);
+        row.setup = Setup { case: "a".into(), ..study.run["one"].setup(0.1, 4) };
+        let strong = [[1, 2].map(|n| mesh(n, 0.1, 10_000)), [1, 2].map(|n| mesh(n, 0.03, 100_000))];
+        let all = [&strong.concat()[..], &[spaced(0.1), spaced(0.05)]].concat();
+        let lacking = |runs: &[Run]| {
+            let lines = [of_ball(runs), vec![line(Entry::Run(Box::new(row.clone())))]].concat();
+            require_made(&study, &lines, &paths(place.path())).unwrap()
+        };
+        assert_eq!(lacking(&all), [""; 0]);
+        let is_not = |of: &str| format!("{of} is not in the record");
+        assert_eq!(
+            lacking(&all[..3]),
+            [
+                "mesher ball strong n=4 sim:2 default",
+                "mesher ball spacing of 4e5 n=4 solo:1 default",
+                "mesher ball spacing of 4e5 n=4 solo:1 default"
+            ]
+            .map(is_not)
+        );
+        // A warm-up is no result.
+        let warm = Run { warm_up: true, ..spaced(0.05) };
+        let with_warm = [&all[..5], &[warm]].concat();
+        assert_eq!(lacking(&with_warm), [is_not("mesher ball spacing of 4e5 n=4 solo:1 default")]);
+        let without_row = require_made(&study, &of_ball(&all), &paths(place.path())).unwrap();
+        assert_eq!(without_row, [is_not("the run one")]);
+        // What failed is named as such.
+        let failed = NoResult { setup: row.setup.clone(), why: "no memory".into() };
+        let lines = [of_ball(&all), vec![line(Entry::Failure(failed))]].concat();
+        assert_eq!(require_made(&study, &lines, &paths(place.path())), Ok(vec![]));
+    }
+
+    /// A program of this machine is another one elsewhere.
+    #[test]
+    fn a_script_that_was_edited_is_not_that_of_the_record() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let put = |name: &str, text: &str| fs::write(at(name), text).unwrap();
+        put("ball.toml", BALL);
+        put("mesh.sh", "true");
+        put(
+            "s.toml",
+            "[[series]]\nexperiment = 'strong'\ncase = 'ball.toml'\nengines = ['e.toml']\n",
+        );
+        let made = |words: &str, edited: &str| {
+            put("e.toml", &format!("{words}, '{{case}}', '{{out}}']\n"));
+            put("mesh.sh", "true");
+            let study = Study::read(&at("s.toml")).unwrap();
+            let engine = Engine::find(&study.series[0].engines[0], None, &Paths::find()).unwrap();
+            let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
+            (run.setup.weights, run.setup.partitioner) = Default::default();
+            (run.setup.engine, run.program) = ("e".into(), digest_of(engine.files()));
+            put("mesh.sh", edited);
+            require_made(&study, &of_ball(&[run]), &paths(place.path()))
+        };
+        let own = "program = '{here}/mesh.sh'\n[run]\nserial = ['{program}'";
+        assert_eq!(made(own, "true"), Ok(vec![]));
+        let why = made(own, "false").unwrap_err().why;
+        assert!(why.contains("e.toml: its program is not that of the record"), "{why}");
+        assert_eq!(made("[run]\nserial = ['sh', '{here}/mesh.sh'", "false"), Ok(vec![]));
     }
 
     #[test]

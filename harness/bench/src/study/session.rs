@@ -12,7 +12,7 @@ use crate::experiments::entry::{
 use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Meshes, another_mesh};
 use crate::experiments::{machine, network};
-use crate::{jsonl, name_of};
+use crate::jsonl;
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{Failure, Progress, Result, Watch};
@@ -151,12 +151,9 @@ impl Session<'_> {
     fn all(&mut self, rows: &mut Vec<Judged>) -> Result<()> {
         self.open()?;
         let study = self.study;
-        for series in &study.series {
-            let unstated = series.cells.is_empty().then_some(None);
-            for cells in series.cells.iter().copied().map(Some).chain(unstated) {
-                let mut points = self.of_series(series, cells)?;
-                self.make(&mut points)?;
-            }
+        for (series, cells) in study.series.iter().flat_map(Series::sizes) {
+            let points = self.of_series(series, cells)?;
+            self.make(points)?;
         }
         for (row, number) in study.row.iter().zip(1..) {
             Progress.check()?;
@@ -200,11 +197,8 @@ impl Session<'_> {
 
     /// Plans the runs of a series at one size.
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>> {
-        use Experiment::{Spacing, Strong, Weak, Weights};
-        let (experiment, named) = (series.experiment, name_of(&series.experiment));
         let mut base = self.base(&series.case, None)?;
-        let (of_case, inputs) = ([base.layer_cells_min], base.inputs.clone());
-        let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
+        let (n, inputs) = (base.layer_cells_min, base.inputs.clone());
         let mut points = Vec::new();
         for engine in &series.engines {
             let description = &self.runner.programs.named(engine).description;
@@ -213,45 +207,25 @@ impl Session<'_> {
                 let is_able = !series.layouts(description, false).is_empty();
                 let why = self.mpi_left_out().filter(|_| is_able);
                 let why = why.unwrap_or("its engine file does not offer them");
+                let serial = series.setups(engine, None, n, &[(Comm::Solo, 1)]).remove(0);
+                let setup = Setup { spacing_min: base.spacing_min, ..serial };
+                let named = &setup.experiment;
                 let why = format!("{engine} cannot make the runs of the series {named}: {why}");
                 (self.progress)(&why);
-                let (experiment, engine) = (named.clone(), engine.clone());
-                let [weights, partitioner] = <[_; 2]>::from(series.choices()[0]).map(str::to_owned);
-                let serial = Setup::serial(&series.name(), base.spacing_min, layers[0]);
-                let setup = Setup { experiment, engine, weights, partitioner, ..serial };
                 self.append(Entry::LeftOut(NoResult { setup, why }))?;
             }
-            let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
-            for (n, (comm, ranks)) in all {
+            for setup in series.setups(engine, cells, n, &layouts) {
                 if let Some(facets) = series.facets {
-                    base = self.base(&series.case, Some([facets, ranks]))?;
+                    base = self.base(&series.case, Some([facets, setup.ranks]))?;
                 }
-                let target = cells.map(|n| if experiment == Weak { n * ranks as f64 } else { n });
-                let finest = match target {
-                    None => base.spacing_min,
-                    Some(target) => self.spacing(&base, base.layer_cells_min, target)?,
-                };
-                // Coarser by factors of two, while there are enough cells to measure.
-                let target = target.filter(|_| experiment == Spacing).unwrap_or_default();
-                let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
-                for spacing in (0..=halvings).rev().map(|k| finest * 2f64.powi(k)) {
-                    let of_mesh = Setup {
-                        experiment: named.clone(),
-                        engine: engine.clone(),
-                        ranks,
-                        comm,
-                        series_cells: cells.filter(|_| !matches!(experiment, Strong | Weights)),
-                        ..Setup::serial(&base.name, spacing, n)
-                    };
-                    let case = base.write(spacing, n, false)?;
-                    points.extend(series.choices().iter().map(|(weights, partitioner)| {
-                        let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
-                        let setup = Setup { weights, partitioner, ..of_mesh.clone() };
-                        let repeats = self.options.repeat.map_or(series.repeats, usize::from);
-                        let (case, inputs) = (case.clone(), inputs.clone());
-                        Planned { setup, case, inputs, repeats, warm_up: true, failed: false }
-                    }));
-                }
+                let parts = if series.experiment == Experiment::Weak { setup.ranks } else { 1 };
+                let finest = cells.map(|cells| self.spacing(&base, n, cells * parts as f64));
+                let finest = finest.transpose()?.unwrap_or(base.spacing_min);
+                let setup = Setup { spacing_min: finest * setup.spacing_min, ..setup };
+                let case = base.write(setup.spacing_min, setup.layer_cells_min, false)?;
+                let repeats = self.options.repeat.map_or(series.repeats, usize::from);
+                let (inputs, warm_up, failed) = (inputs.clone(), true, false);
+                points.push(Planned { setup, case, inputs, repeats, warm_up, failed });
             }
         }
         Ok(points)
@@ -322,14 +296,22 @@ impl Session<'_> {
                 }
             }
         }
-        self.make(&mut points)?;
+        self.make(points)?;
         self.made.extend(row.runs().cloned());
         Ok(judge(study, row, &self.lines))
     }
 
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
     /// a mesh, or would exceed the time or the memory, is not run on it.
-    fn make(&mut self, points: &mut [Planned]) -> Result<()> {
+    fn make(&mut self, mut points: Vec<Planned>) -> Result<()> {
+        if let Some(repeated) = &self.study.repeated {
+            points.retain_mut(|point| {
+                let of = repeated.iter().find(|(setup, _)| setup.is_close(&point.setup));
+                let most = of.filter(|_| self.options.repeat.is_none()).map(|(_, most)| *most);
+                point.repeats = point.repeats.min(most.unwrap_or(usize::MAX));
+                of.is_some()
+            });
+        }
         let is_known = self.lines.iter().any(|line| line.network().is_some());
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
             self.measure_network()?;

@@ -148,8 +148,7 @@ pub fn unit(name: &str) -> &'static str {
 /// Returns every metric of the history with its changes. Of all metrics with a change, at most the fraction `alpha`
 /// is expected to have none in truth.
 pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
-    let names: BTreeSet<&String> =
-        records.iter().flat_map(|record| record.metrics.keys()).collect();
+    let names: BTreeSet<&String> = records.iter().flat_map(|of| of.metrics.keys()).collect();
     let of_metric = |name: &String| {
         let value = |(i, record): (usize, &Record)| Some((i, *record.metrics.get(name)?));
         let points: Vec<(usize, f64)> = records.iter().enumerate().filter_map(value).collect();

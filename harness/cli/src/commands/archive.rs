@@ -16,7 +16,7 @@ use report::pretty;
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
-use run::engine::runner::{Engine, Given, label};
+use run::engine::runner::{Engine, Given};
 use std::fs;
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
@@ -48,16 +48,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Failure::unless(!is_inside, why)?;
     let records = records_in(report)?;
     let lines = read(&records)?;
-    let expected = Expected::of(&lines)?;
-    let of_study = Study::read(study)?;
+    let mut expected = Expected::of(&lines)?;
     let paths = Paths::find();
-    require_made(&of_study, &lines, &paths)?;
-    let names: Vec<String> = of_study.engines().iter().map(|name| label(name)).collect();
-    let mut programs = lines.iter().filter_map(Line::run).map(|run| &run.setup.engine);
-    if let Some(other) = programs.find(|name| !names.contains(name)) {
-        let why = format!("the study does not name {other}, of which the record has runs");
-        return Err(Failure::input(why));
-    }
+    expected.missing.extend(require_made(&Study::read(study)?, &lines, &paths)?);
     let wrong = |error| Failure::at(out, error);
     let staging = Staging::beside(out).map_err(wrong)?;
     let place = staging.path();
@@ -129,16 +122,17 @@ pub struct ReplayArguments {
 pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     let ReplayArguments { archive, record, session, .. } = arguments;
     let lines = read(&[archive.join(RECORD)])?;
-    let expected = Expected::of(&lines)?;
+    let mut expected = Expected::of(&lines)?;
     let path = archive.join(EXPECTED);
     let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
-    expected.missing.iter().for_each(|why| eprintln!("harness: the archive lacks runs: {why}"));
     if text != pretty(&expected) {
         let why = "does not follow from the record: it was changed, or is of another version of the harness. The record's values are compared";
         eprintln!("harness: {} {why}", path.display());
     }
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
-    require_made(&study, &lines, &Paths::find())?;
+    expected.missing.extend(require_made(&study, &lines, &Paths::find())?);
+    expected.missing.iter().for_each(|why| eprintln!("harness: not in the archive: {why}"));
+    study.repeated = Some(expected.runs.clone());
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
     // A network that was given is no property of a machine. The last one is that of the values.
     let last = lines.iter().filter_map(Line::network).next_back().map(|(_, network)| network);
@@ -167,7 +161,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
             expected.commit
         );
     }
-    Ok(if has_failed { EXIT_FAILED } else { code(&replayed) })
+    Ok(if has_failed { EXIT_FAILED } else { code(&replayed, expected.missing.is_empty()) })
 }
 
 /// Removes the programs of others that cannot be run here, and prints why.
@@ -180,11 +174,8 @@ fn leave_out_missing(study: &mut Study) -> Result<()> {
             study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
         }
     }
-    study.series.retain(|series| !series.engines.is_empty());
-    if study.series.is_empty() && study.row.is_empty() {
-        return Err(Failure::missing("no program of the archive is installed here"));
-    }
-    Ok(())
+    let why = Failure::missing("no program of the archive is installed here");
+    if study.engines().is_empty() { Err(why) } else { Ok(()) }
 }
 
 /// A row per run with the number of exact values that are equal, and one for each other value.
@@ -230,10 +221,12 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     Table { columns, rows, notes, ..Table::default() }
 }
 
-fn code(replayed: &Replayed) -> u8 {
+fn code(replayed: &Replayed, is_whole: bool) -> u8 {
     match () {
         () if !replayed.holds() => EXIT_FAILED,
-        () if !replayed.is_judged() || replayed.count(Verdict::Missing) > 0 => EXIT_MISSING,
+        () if !is_whole || !replayed.is_judged() || replayed.count(Verdict::Missing) > 0 => {
+            EXIT_MISSING
+        }
         () => EXIT_HOLDS,
     }
 }

@@ -54,15 +54,17 @@ pub struct Arguments {
 /// # Errors
 /// If the study or the record is invalid, a program is missing, or a report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let (study, report) = (read(arguments)?, arguments.report.as_deref());
+    let (mut study, report) = (read(arguments)?, arguments.report.as_deref());
     let in_report = report.map(|directory| directory.join("record.jsonl"));
     let record = arguments.record.clone().or(in_report);
     let record = record.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"));
     let code = match arguments.show {
         true => {
             let mut lines = super::report::read(&[record])?;
+            // A record may be of --engine.
+            study.series.iter_mut().for_each(|series| series.engines.clear());
             lines.retain(|line| study.unasked(line).is_none());
-            publish(&study, &study::judged(&study, &lines), &lines, report)?
+            publish(&study, &study::judged(&study, &lines), &lines, arguments)?
         }
         false => measure(arguments, study, &record)?,
     };
@@ -103,7 +105,7 @@ fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8>
         print_without(&outcome.lines);
         return Err(Failure::interrupted());
     }
-    let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
+    let code = publish(&study, &outcome.rows, &outcome.lines, arguments);
     println!("record: {}", record.display());
     if outcome.interrupted {
         eprintln!("harness: interrupted: the record contains all results so far");
@@ -154,7 +156,7 @@ fn programs(given: &Given, study: &mut Study) -> Result<Programs> {
 
 /// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given; returns the exit
 /// code.
-fn publish(study: &Study, rows: &[Judged], lines: &[Line], report: Option<&Path>) -> Result<u8> {
+fn publish(study: &Study, rows: &[Judged], lines: &[Line], of: &Arguments) -> Result<u8> {
     if !study.series.is_empty() {
         print!("{}", tables::text(&Groups::of(lines)));
         print_without(lines);
@@ -163,9 +165,9 @@ fn publish(study: &Study, rows: &[Judged], lines: &[Line], report: Option<&Path>
     if study.row.is_empty() {
         return Ok(code);
     }
-    let table = targets(rows);
+    let table = targets(rows, &of.only);
     print!("{}", table.text());
-    if let Some(directory) = report {
+    if let Some(directory) = &of.report {
         let path = directory.join(PAGE);
         let session = lines.iter().rev().find_map(Line::session);
         let unknown = || "a machine that the record does not describe".to_owned();
@@ -192,13 +194,16 @@ pub(super) fn print_without(lines: &[Line]) -> bool {
 }
 
 /// The table of targets, with the counts of the verdicts below it.
-fn targets(rows: &[Judged]) -> Table {
+fn targets(rows: &[Judged], only: &[String]) -> Table {
     use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
     let count = |verdict: Verdict| {
         let count = rows.iter().filter(|row| row.verdict() == verdict).count();
         format!("{count} {}", verdict.words())
     };
-    let counts = [Met, Missed, Failed, LeftOut, ForComparison].map(count).join(", ");
+    let mut counts = [Met, Missed, Failed, LeftOut, ForComparison].map(count).join(", ");
+    if !only.is_empty() {
+        counts += &format!("; of the study only {} (--only)", only.join(", "));
+    }
     let columns = vec!["row", "target", "measured", "how", "verdict"];
     let rows = rows.iter().map(|row| row.fields().to_vec()).collect();
     Table { columns, rows, notes: vec![counts], ..Table::default() }
@@ -221,17 +226,15 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     fn of_series(setup: &Setup) -> [&str; 3] {
         [&setup.engine, &setup.experiment, &setup.case]
     }
-    let results = lines.iter().filter(|line| is_result(line)).filter_map(Line::run);
-    let runs: HashSet<_> = results.map(|run| of_series(&run.setup)).collect();
-    let mut left_out = lines.iter().filter_map(|line| match &line.entry {
-        // A row says itself that it was left out.
-        Entry::LeftOut(left) => Some(of_series(&left.setup)).filter(|of| of[1] != TARGETS),
-        _ => None,
-    });
+    let results = lines.iter().filter(|line| is_result(line)).filter_map(Line::setup);
+    let runs: HashSet<_> = results.map(of_series).collect();
+    let left = lines.iter().filter(|line| matches!(line.entry, Entry::LeftOut(_)));
+    // A row says itself that it was left out.
+    let mut left = left.filter_map(Line::setup).map(of_series).filter(|of| of[1] != TARGETS);
     if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let without = left_out.find(|of| !runs.contains(of));
+    let without = left.find(|of| !runs.contains(of));
     let has_series = !study.series.is_empty();
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
@@ -295,7 +298,7 @@ mod tests {
         let missed =
             Judged { measured: Some((99.5e6, "measured")), ..unjudged(row, false, String::new()) };
         let failed = unjudged(row, true, "run a failed: <no memory>".into());
-        let table = targets(&[missed, failed]);
+        let table = targets(&[missed, failed], &[]);
         let text = table.text();
         for part in [
             "at least 100.00 M cells/s, at most 300.00 M cells/s",
@@ -305,7 +308,10 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
+        let of_one = markdown(&targets(&[], &["rate|1".into()]), "2 cores");
+        assert!(of_one.contains("for comparison; of the study only rate"), "{of_one}");
         let markdown = markdown(&table, "2 cores");
+        assert!(!markdown.contains("--only"), "{markdown}");
         let table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
         assert_eq!(table.len(), 4);
         assert!(table[1].starts_with("| --- | --- |"), "{markdown}");

@@ -144,7 +144,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let other =
         fixture.harness("archive series series.toml -o b --title T --author A --licence MIT");
     assert!(
-        other.code == 2 && other.printed.contains("the study does not name other"),
+        other.code == 2 && other.printed.contains("the study does not ask for, other"),
         "{}",
         other.printed
     );
@@ -191,7 +191,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
 #[test]
 fn the_last_build_and_the_last_network_are_those_of_an_archive() {
     let fixture = scripted();
-    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
     fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
     fixture
         .write("study.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [1]\n");
@@ -214,17 +214,46 @@ fn the_last_build_and_the_last_network_are_those_of_an_archive() {
     let study = fs::read_to_string(fixture.path("study.toml")).unwrap();
     fixture.write("study.toml", &format!("{study}engines = ['mesher', 'engine.toml']\n"));
     let archive = fixture.harness("archive out study.toml -o a --title T --author A --licence MIT");
-    assert_eq!(archive.code, 0, "{}", archive.printed);
+    let lacks = "engine case strong n=1 sim:1 default is not in the record";
+    assert!(archive.code == 3 && archive.printed.contains(lacks), "{}", archive.printed);
     // What cannot be run here has its own reason.
     fixture.write("a/study/engine.toml", "serial = 1");
     let expected = fs::read_to_string(fixture.path("a/expected.json")).unwrap();
     assert!(expected.contains("\"00\"") && !expected.contains("\"01\""), "{expected}");
     let replay = fixture.harness("replay a --mesher ./mesher --record again.jsonl");
-    assert_eq!(replay.code, 0, "{}", replay.printed);
+    assert!(replay.code == 3 && replay.printed.contains("0 missing"), "{}", replay.printed);
     let left_out = "engine.toml are left out: ";
     assert!(replay.printed.contains(left_out) && replay.printed.contains("unknown field"));
     let again = fs::read_to_string(fixture.path("again.jsonl")).unwrap();
     assert!(again.contains("\"latency_s\":") && !again.contains("\"latency_s\":0.25"), "{again}");
+}
+
+/// What a study asks for and its record lacks is named, and is not executed: nothing would be compared with it, and its time is unknown.
+#[test]
+fn an_incomplete_record_gives_no_green_replay() {
+    let fixture = scripted();
+    let series = |of: &str| format!("[[series]]\ncase = 'case.toml'\nexperiment = {of}\n");
+    let study = series("'strong'") + &series("'layers'\nlayers = [1, 2]");
+    fixture.write("study.toml", &study);
+    let bench = fixture.harness("bench study.toml --mesher ./mesher --only strong --report out");
+    assert_eq!(bench.code, 0, "{}", bench.printed);
+    let archive = fixture.harness("archive out study.toml -o a --title T --author A --licence MIT");
+    let page = fs::read_to_string(fixture.path("a/README.md")).unwrap();
+    for n in [1, 2] {
+        let lacks = format!("mesher case layers n={n} solo:1 default is not in the record");
+        assert!(archive.code == 3 && archive.printed.contains(&lacks), "{}", archive.printed);
+        assert!(page.contains(&lacks), "{page}");
+    }
+    let replay = fixture.harness("replay a --mesher ./mesher");
+    assert!(replay.code == 3 && replay.printed.contains("0 differ"), "{}", replay.printed);
+    assert!(replay.printed.contains(" strong ") && replay.printed.contains("not in the archive"));
+    assert!(!replay.printed.contains("n=2 solo:1 default, warm-up"), "{}", replay.printed);
+    // As often as in the record, unless more is asked for.
+    fixture.write("a/study/study.toml", &series("'strong'\nrepeats = 9"));
+    let whole = fixture.harness("replay a --mesher ./mesher");
+    assert!(whole.code == 0 && !whole.printed.contains("repeat 2"), "{}", whole.printed);
+    let twice = fixture.harness("replay a --mesher ./mesher --repeat 2");
+    assert!(twice.code == 0 && twice.printed.contains("repeat 2"), "{}", twice.printed);
 }
 
 /// The report says why.
@@ -251,7 +280,7 @@ fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
 #[test]
 fn an_edited_case_is_another_one() {
     let fixture = scripted();
-    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, $ranks)"']}], "digest""#;
+    let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
     fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
     let case = "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'sphere'\nfacets = 80\n";
     fixture.write(

@@ -107,7 +107,7 @@ const NOT_READ: [&str; 4] = [
 ];
 
 /// Digits with points, thousands separators, and a power of ten.
-const LITERAL: &str = r"[0-9]{1,3}(?:,[0-9]{3})+(?:\.[0-9]+)?|[0-9.]*[0-9](?:[eE][-+]?[0-9]+|\s*\\(?:cdot|times)\s*10\^(?:\{\s*-?[0-9]+\s*\}|[0-9]))?";
+const LITERAL: &str = r"[0-9]{1,3}(?:(?:,|\{,\}|\\,|~)[0-9]{3})+(?:\.[0-9]+)?|[0-9.]*[0-9](?:[eE][-+]?[0-9]+|\s*\\(?:cdot|times)\s*10\^(?:\{\s*-?[0-9]+\s*\}|[0-9]))?";
 
 /// What a text has.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -235,10 +235,12 @@ fn rounds_to(number: &Number, literal: &str) -> bool {
 
 /// The digits before the power of ten of a number, without separators, and that power.
 fn mantissa(literal: &str) -> (String, i32) {
+    let literal =
+        ["{,}", "\\,", "~", ","].iter().fold(literal.to_owned(), |of, by| of.replace(by, ""));
     let end = literal.find(['e', 'E', '\\', ' ']).unwrap_or(literal.len());
     let power = literal[end..].rsplit(['e', 'E', '^']).next().unwrap_or_default();
     let power = power.trim_matches(|c: char| !c.is_ascii_digit() && c != '-');
-    (literal[..end].replace(',', ""), power.parse().unwrap_or(0))
+    (literal[..end].to_owned(), power.parse().unwrap_or(0))
 }
 
 #[cfg(test)]
@@ -289,12 +291,16 @@ mod tests {
 
     #[test]
     fn unknown_keys_old_copies_and_numbers_by_hand_are_found() {
-        let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
+        let record = [
+            number("a/time", "1.234", "1.10--1.30"),
+            number("a/speedup", "11.3", ""),
+            number("a/rate", "1234.5", "9234.5--9999.5"),
+        ];
         let findings = |text: &str| check(text, &record).findings;
-        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, $1.23\\times10^0$ or 0.123e1 s, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
+        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, $1.23\\times10^0$ or 0.123e1 s, 1\\,234.5 or 1{,}234.5 or 1~234.5 cells, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\\\\[1.25in] \\vskip 1.25in\n\\href{http://x/1.999%20b}{b}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
-        assert_eq!(check(right, &record), Checked { compared: 9, by_hand: 6, findings: vec![] });
+        assert_eq!(check(right, &record), Checked { compared: 12, by_hand: 9, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
             ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),
@@ -312,6 +318,9 @@ mod tests {
             ("1.23e5", "1.23e5 is written by hand"),
             ("$1.23\\cdot 10^{-3}$", "is written by hand"),
             ("1,001.23 s", "1,001.23 is written by hand"),
+            // A part of it would do.
+            ("9\\,011.3 s", "9\\,011.3 is written by hand"),
+            ("8~234.5 s", "8~234.5 is written by hand"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),

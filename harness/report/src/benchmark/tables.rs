@@ -12,8 +12,7 @@ use contract::number::{digits, grouped};
 /// All tables: experiments, projections, phases, models, programs.
 pub fn tables(groups: &Groups) -> Vec<Table> {
     let experiments = distinct(groups.all.iter().map(|group| group.setup.experiment.as_str()));
-    let mut all: Vec<Table> =
-        experiments.into_iter().map(|name| experiment(groups, name)).collect();
+    let mut all: Vec<Table> = experiments.into_iter().map(|of| experiment(groups, of)).collect();
     all.push(projections(groups));
     all.extend(largest(groups).into_iter().map(phases));
     all.extend(models::tables(groups));

@@ -148,8 +148,7 @@ impl Description {
     /// One sentence, if it is wrong.
     pub fn parse(text: &str) -> Result<Self> {
         let page = PAGE.split_once("## Promises").map_or(PAGE, |(_, page)| page);
-        let mut description: Self =
-            toml::from_str(text).map_err(|error| explain(text, &error, page))?;
+        let mut description: Self = toml::from_str(text).map_err(|e| explain(text, &e, page))?;
         description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
         if let Some(first) = templates.serial.first().cloned() {

@@ -89,8 +89,7 @@ impl fmt::Display for Layout {
         write!(f, "{}", self.ranks)?;
         let choices =
             [("", &self.partitioner), ("base ", &self.level_base), ("weights ", &self.weights)];
-        let mut chosen =
-            choices.iter().filter_map(|(label, choice)| Some((label, choice.as_ref()?)));
+        let mut chosen = choices.iter().filter_map(|(label, of)| Some((label, of.as_ref()?)));
         chosen.try_for_each(|(label, choice)| write!(f, ", {label}{choice}"))
     }
 }

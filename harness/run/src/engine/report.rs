@@ -98,8 +98,7 @@ impl RunReport {
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("the run report {} is unusable: {why}", path.display());
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        let mut report: Self =
-            serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let mut report: Self = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
         report.fault().map_or(Ok(()), |why| Err(wrong(why)))?;
         // A clock that is too coarse for the run shows nothing.
         report.time_wall_s = report.time_wall_s.filter(|time| *time > 0.0);

@@ -142,6 +142,16 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
     assert_eq!(with(|run| run.facets = 0, &[]), kept, "one that does not report them");
     assert_eq!(with(|run| run.cells = 18, &[EQUAL_RUNS]), kept);
     assert_eq!(with(|run| run.facets = 13, &[EQUAL_RUNS]), left_out);
+    // Another program has a mesh of its own, of the same facets.
+    let other = |facets: u64| {
+        let mut run = run(Comm::Solo, 18, &[("a", &[1.0])]);
+        (run.setup.engine, run.digest, run.facets) = ("p4est".into(), String::new(), facets);
+        let groups = Groups::of(&[of(|_| ()), line_of(run)]);
+        (groups.all.len(), groups.missing)
+    };
+    assert_eq!([other(12), other(0)], [(2, vec![]), (2, vec![])]);
+    let (count, missing) = other(13);
+    assert!(count == 1 && missing[0].contains("the number of facets 13"), "{missing:?}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use super::*;
-use crate::experiments::entry::{NoResult, Run};
+use crate::experiments::entry::{Entry, NoResult, Run};
 use crate::testing::{line, run, study as read};
 use run::engine::description::Description;
 use std::collections::BTreeSet;
@@ -177,7 +177,7 @@ fn case_files_of_one_name_would_be_meshed_around_one_geometry() {
 #[test]
 fn a_study_asks_for_its_runs_alone() {
     let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\ncells = [1e6]\nsim = [1, 2]\n\
-                [[series]]\nexperiment = 'layers'\ncase = 'cube'\ncells = [1e4]\nlayers = [1, 2]\nsim = [1]\n";
+                engines = ['mesher', 'x/p4est.toml']\n[[series]]\nexperiment = 'layers'\ncase = 'cube'\ncells = [1e4]\nlayers = [1, 2]\nsim = [1]\n";
     let study = read(text).unwrap();
     let strong = |change: fn(&mut Run)| {
         let mut run = run(Comm::Sim, 2_000_000, &[("a", &[1.0, 1.0])]);
@@ -196,7 +196,14 @@ fn a_study_asks_for_its_runs_alone() {
         },
     ];
     assert_eq!(asked.map(strong), [true; 4]);
-    let others: [fn(&mut Run); 8] = [
+    let others: [fn(&mut Run); 10] = [
+        |run| run.setup.engine = "other".into(),
+        // In the other series.
+        |run| {
+            run.setup.engine = "p4est".into();
+            (run.setup.experiment, run.setup.series_cells) = ("layers".into(), Some(1e4));
+            (run.setup.layer_cells_min, run.setup.ranks) = (2, 1);
+        },
         |run| run.setup.experiment = "weak".into(),
         |run| run.setup.case = "ball".into(),
         |run| run.setup.ranks = 4,
@@ -212,7 +219,7 @@ fn a_study_asks_for_its_runs_alone() {
             run.setup.ranks = 1;
         },
     ];
-    assert_eq!(others.map(strong), [false; 8]);
+    assert_eq!(others.map(strong), [false; 10]);
     // What failed or was left out is of an experiment, too.
     let setup = Setup { experiment: "weak".into(), ..Setup::serial("cube", 1.0, 4) };
     let without = NoResult { setup: setup.clone(), why: String::new() };
