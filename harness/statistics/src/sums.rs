@@ -59,10 +59,12 @@ impl Sum {
             let chosen: Vec<usize> = terms.filter(|term| chosen.contains(&kinds[*term])).collect();
             let sum = |of: &Products| Self::of_terms(of, chosen.clone());
             let beyond = |(known, further): &(Products, Vec<Row>)| sum(known).error(further);
-            (splits.iter().map(beyond).sum::<f64>().max(EXACT), sum(&all))
+            let (found, beyond) = (sum(&all), splits.iter().map(beyond).sum::<f64>());
+            // One that predicts exactly by chance does not fit what is known.
+            ([beyond, found.error(rows)].map(|error| error.max(EXACT)), found)
         };
         let all = choices(count, most).into_iter().map(candidate);
-        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sum)| sum)
+        all.min_by(|a, b| a.0.partial_cmp(&b.0).expect("finite")).map(|(_, sum)| sum)
     }
 
     /// The least squares of these terms: while some would be subtracted, the one of which most would be is left out.
@@ -160,6 +162,16 @@ mod tests {
                 prop_assert!((sum.at(terms) - value).abs() < 1e-3, "{sum:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_sum_that_predicts_exactly_by_chance_is_not_taken_for_one_that_fits() {
+        // A constant and x^2 predict the last value from those before it to 1e-6, and miss the first by 14 %.
+        let value =
+            |x: f64| 9.656798264658295 * x + 30.846609909791557 * x * x + 86.03330934449222 / x;
+        let rows = rows(&[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0].map(|x| [x, value(x)]));
+        let sum = Sum::fit(&rows, &[0, 1, 2, 3], 3).unwrap();
+        assert!(rows.iter().all(|row| (sum.at(&row.2) - 1.0).abs() < 1e-3), "{sum:?}");
     }
 
     #[test]
