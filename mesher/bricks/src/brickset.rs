@@ -31,9 +31,6 @@ pub struct BrickSet {
     full: Option<Box<BrickSet>>,
 }
 
-/// Number of bricks for which a set allocates at its first brick: most sets grow beyond a vector's usual four.
-const CAPACITY_FIRST: usize = 64;
-
 /// A run of bricks whose keys agree in their upper half.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Run {
@@ -100,10 +97,6 @@ impl BrickSet {
             assert!(before < key, "bricks must be added in Morton order");
         }
         if high != last || self.runs.is_empty() {
-            if self.runs.is_empty() {
-                self.low.reserve(CAPACITY_FIRST);
-                self.bits.reserve(CAPACITY_FIRST);
-            }
             self.runs.push(Run { high, start: self.low.len() });
         }
         self.low.push(key as u32);

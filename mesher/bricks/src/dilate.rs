@@ -74,20 +74,14 @@ const PAGE: usize = 1 << PAGE_LOG2;
 const NONE: u32 = u32::MAX;
 
 /// Bricks gathered from overlapping tiles, block by block.
-///
-/// Blocks are looked up by *page*. A tile and its margin touch 3 x 3 x 3 pages, many times each; a table of the
-/// most recent page by position modulo 4, in which neighbours do not collide, finds these.
 struct Gathered {
     /// Blocks along the root's edge.
     extent: i64,
     /// Bits that octants of this level can have, by brick of a block.
     valid: [u64; BLOCK],
-    numbers: FxHashMap<u64, u32>,
-    /// Blocks of each page, or [`NONE`].
-    pages: Vec<[u32; PAGE]>,
+    /// Where the words of the blocks of each page are, or [`NONE`].
+    pages: FxHashMap<u64, [u32; PAGE]>,
     words: Vec<[u64; BLOCK]>,
-    /// Keys of the most recent pages, and their numbers.
-    latest: [(u64, u32); PAGE],
 }
 
 impl Gathered {
@@ -98,10 +92,8 @@ impl Gathered {
         Self {
             extent: if l < 3 { 1 } else { 1 << (l - 3) },
             valid: std::array::from_fn(valid),
-            numbers: FxHashMap::default(),
-            pages: Vec::new(),
+            pages: FxHashMap::default(),
             words: Vec::new(),
-            latest: [(u64::MAX, 0); PAGE],
         }
     }
 
@@ -112,8 +104,8 @@ impl Gathered {
             return;
         }
         let key = morton(p.map(|c| c as u32));
-        let page = self.page(key >> PAGE_LOG2);
-        let block = &mut self.pages[page as usize][key as usize % PAGE];
+        let page = self.pages.entry(key >> PAGE_LOG2).or_insert([NONE; PAGE]);
+        let block = &mut page[key as usize % PAGE];
         if *block == NONE {
             *block = u32::try_from(self.words.len()).expect("fewer than 2^32 blocks");
             self.words.push([0; BLOCK]);
@@ -127,33 +119,18 @@ impl Gathered {
         self.words.len() * (size_of::<[u64; BLOCK]>() + 12 + 4 * BLOCK)
     }
 
-    /// The number of a page, which is created if it does not exist.
-    #[inline]
-    fn page(&mut self, key: u64) -> u32 {
-        let latest = &mut self.latest[key as usize % PAGE];
-        if latest.0 != key {
-            let number = *self.numbers.entry(key).or_insert_with(|| {
-                self.pages.push([NONE; PAGE]);
-                (self.pages.len() - 1) as u32
-            });
-            *latest = (key, number);
-        }
-        latest.1
-    }
-
     /// The set of all octants gathered. Blocks are put in order where they are: this is the largest set of a mesh.
     fn into_set(mut self) -> BrickSet {
-        let mut order: Vec<(u64, u32)> = self.numbers.into_iter().collect();
-        order.sort_unstable();
+        let mut pages: Vec<_> = self.pages.into_iter().collect();
+        pages.sort_unstable_by_key(|page| page.0);
         let mut keys: Vec<u64> = Vec::with_capacity(self.words.len());
         let mut places: Vec<u32> = Vec::with_capacity(self.words.len());
-        for (page, number) in order {
-            for (block, &at) in (0..).zip(&self.pages[number as usize]).filter(|b| *b.1 != NONE) {
+        for (page, blocks) in pages {
+            for (block, at) in (0..).zip(blocks).filter(|b| b.1 != NONE) {
                 keys.push((page << PAGE_LOG2 | block) << BLOCK_LOG2);
                 places.push(at);
             }
         }
-        self.pages = Vec::new();
         arrange(&mut self.words, &mut places);
         let keys = keys.iter().flat_map(|block| *block..block + BLOCK as u64);
         BrickSet::from_sorted(keys, self.words.into_flattened())

@@ -102,17 +102,15 @@ struct Side {
 }
 
 impl FacetTest {
-    fn new(f: &Facet) -> Self {
-        let normal = f.normal();
-        Self { facet: *f, normal, sides: [0, 1, 2].map(|a| sides(&f.v, normal[a], a)) }
-    }
-
-    /// The test of facet `f`, which is prepared unless the last one was of the same facet.
-    #[inline]
+    /// The test of facet `f`, which is prepared unless the last one was of the same facet; part by part, as a whole passes through memory twice.
+    #[inline(never)]
     fn prepared(&mut self, f: &Facet) -> &Self {
         // Vertex by vertex, because the compiler calls a function for the comparison of all.
         if (0..3).any(|i| self.facet.v[i] != f.v[i]) {
-            *self = Self::new(f);
+            (self.facet, self.normal) = (*f, f.normal());
+            for a in 0..3 {
+                self.sides[a] = sides(&f.v, self.normal[a], a);
+            }
         }
         self
     }
@@ -316,7 +314,7 @@ mod tests {
             let f = Facet { v };
             let corner = position(at).map(|p| i64::from(p) << 25);
             let shift = ROOT_BITS - l;
-            let masks = widths(|| separated(&FacetTest::new(&f), corner, shift));
+            let masks = widths(|| separated(FacetTest::default().prepared(&f), corner, shift));
             prop_assert!(masks.iter().all(|mask| mask.1 == masks[0].1), "{:?}", masks);
         }
     }
@@ -345,7 +343,9 @@ mod tests {
                 ("normal", &|a| facet(a).normal().map(i128::from).to_vec()),
                 ("crossed", &|a| vec![crossed(&facet(a), corner(a), a[12] as Level).into()]),
                 ("separated", &|a| {
-                    vec![separated(&FacetTest::new(&facet(a)), corner(a), a[12] as u32).into()]
+                    let mut test = FacetTest::default();
+                    let prepared = test.prepared(&facet(a));
+                    vec![separated(prepared, corner(a), a[12] as u32).into()]
                 }),
             ],
         );

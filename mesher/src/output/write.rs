@@ -137,10 +137,8 @@ impl Part {
     /// If they cannot be written.
     pub fn add(&mut self, words: &[u64]) -> io::Result<()> {
         // The words' bytes in memory: to write word by word takes longer than meshing.
-        match cfg!(target_endian = "little") {
-            true => self.0.write_all(bytemuck::cast_slice(words)),
-            false => words.iter().try_for_each(|w| self.0.write_all(&w.to_le_bytes())),
-        }
+        const { assert!(cfg!(target_endian = "little"), "words are written as they are in memory") };
+        self.0.write_all(bytemuck::cast_slice(words))
     }
 
     /// Completes the file of `leaves` words and gives it its final name.

@@ -32,25 +32,53 @@ struct LevelNodes {
     /// Split octants of each node; empty if no octant of the level is split.
     split: Vec<u64>,
     /// Where the block below each node of the level above begins, and the end. A block of its own has the brick of level 0.
-    blocks: Vec<BlockStart>,
+    blocks: BlockStarts,
     /// Placements of the first nodes; the others are local.
     placements: Vec<Placement>,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct BlockStart {
-    node: Node,
-    component: Component,
-    /// Where the octants of its components begin.
-    word: u32,
+/// The first node and the first component of a block, and where the octants of its components begin.
+type BlockStart = [u32; 3];
+
+/// The components of brick `brick` of a block, which ends where another starts.
+#[inline(always)]
+fn part_of([[_, component, word], [_, end, _]]: [BlockStart; 2], brick: u8) -> Part {
+    Part { components: [component, end], word, brick }
 }
 
-impl BlockStart {
-    /// The components of brick `brick` of the block, before the start of the next.
-    #[inline(always)]
-    fn part(self, next: Self, brick: u8) -> Part {
-        Part { components: [self.component, next.component], word: self.word, brick }
+/// Number of blocks in a group.
+const GROUP: usize = 64;
+
+/// The starts of blocks in order, in groups: that of the first, and how much greater the numbers of each are. That takes half of the memory.
+#[derive(Default)]
+struct BlockStarts {
+    groups: Vec<(BlockStart, [[u16; 3]; GROUP])>,
+    len: usize,
+}
+
+impl BlockStarts {
+    fn push(&mut self, block: BlockStart) {
+        if self.len.is_multiple_of(GROUP) {
+            self.groups.push((block, [[0; 3]; GROUP]));
+        }
+        let (first, offsets) = self.groups.last_mut().expect("a group has begun");
+        // A block has at most 8 nodes and 512 words, and no more components; the end of a chunk is one block more.
+        offsets[self.len % GROUP] = std::array::from_fn(|k| (block[k] - first[k]) as u16);
+        self.len += 1;
     }
+
+    #[inline(always)]
+    fn get(&self, block: usize) -> BlockStart {
+        let (first, offsets) = &self.groups[block / GROUP];
+        std::array::from_fn(|k| first[k] + u32::from(offsets[block % GROUP][k]))
+    }
+}
+
+/// The start of the block below a node and of the one after it, which follow on one another; and the number of the next.
+#[derive(Clone, Copy, Default)]
+struct Parent {
+    block: [BlockStart; 2],
+    next: usize,
 }
 
 /// Sets of numbers from 0. The least number represents a set.
@@ -153,7 +181,7 @@ impl Family {
     /// The components of the children.
     #[inline(always)]
     pub fn block(&self) -> Part {
-        self.block[0].part(self.block[1], 0)
+        part_of(self.block, 0)
     }
 
     /// The child brick below octant group `j`; none if no octant of the group is split.
@@ -161,9 +189,9 @@ impl Family {
     pub fn child(&self, j: u64) -> Option<Child> {
         let before = u32::from(self.bricks & ((1u16 << j) - 1) as u8).count_ones();
         (self.bricks >> j & 1 == 1).then(|| Child {
-            node: self.block[0].node + before,
+            node: self.block[0][0] + before,
             exists: brick::children(brick::byte(self.split, j)),
-            part: self.block[0].part(self.block[1], j as u8),
+            part: part_of(self.block, j as u8),
         })
     }
 }
@@ -249,7 +277,7 @@ impl Nodes {
             let has_split = !tree.split[l as usize].is_empty();
             let mut bricks = open_bricks(tree, ownership, l);
             // The bricks above a block, one and two levels.
-            let (mut node, mut parents) = (0, [0; 2]);
+            let (mut node, mut parents) = (0, [Parent::default(); 2]);
             for above in 0..l.checked_sub(1).map_or(1, |l| nodes.levels[l as usize].split.len()) {
                 let split = if l == 0 { 1 } else { nodes.split(l - 1, above as Node) };
                 level.blocks.push(nodes.block_start(node));
@@ -274,7 +302,7 @@ impl Nodes {
                 for (up, parent) in (1..=l).zip(&mut parents) {
                     let place = (block.key >> (3 * (up - 1)) & 7) as u8;
                     block.parents.push(nodes.part(l - up, child as Node, place, parent));
-                    child = *parent;
+                    child = parent.next - 2;
                 }
                 fill(&mut block, &mut nodes.masks, &mut sets);
             }
@@ -286,21 +314,22 @@ impl Nodes {
 
     fn block_start(&mut self, node: Node) -> BlockStart {
         let (component, word) = self.masks.begin();
-        BlockStart { node, component, word }
+        [node, component, word]
     }
 
     /// The components of a node of level `l` at place `brick` of its block, whose parent is not before `parent`, which becomes the parent.
-    fn part(&self, l: Level, node: Node, brick: u8, parent: &mut usize) -> Part {
-        let blocks = &self.levels[l as usize].blocks;
-        while blocks[*parent + 1].node <= node {
-            *parent += 1;
+    #[inline(always)]
+    fn part(&self, l: Level, node: Node, brick: u8, parent: &mut Parent) -> Part {
+        while parent.block[1][0] <= node {
+            let next = self.levels[l as usize].blocks.get(parent.next);
+            *parent = Parent { next: parent.next + 1, block: [parent.block[1], next] };
         }
-        blocks[*parent].part(blocks[*parent + 1], brick)
+        part_of(parent.block, brick)
     }
 
     /// The bricks of a level of the tree, with their components.
     pub fn bricks(&self, tree: &Tree, l: Level) -> impl Iterator<Item = (Brick, Part)> {
-        let (mut node, mut parent) = (0, 0);
+        let (mut node, mut parent) = (0, Parent::default());
         Tree::exists(&tree.split, l).map(move |b| {
             let part = self.part(l, node, (b.key & 7) as u8, &mut parent);
             node += 1;
@@ -315,13 +344,14 @@ impl Nodes {
 
     /// Bytes that the nodes and their components take.
     pub fn bytes(&self) -> usize {
-        let of_level = |l: &LevelNodes| size_of_val(&l.split[..]) + size_of_val(&l.blocks[..]);
+        let of_level =
+            |l: &LevelNodes| size_of_val(&l.split[..]) + size_of_val(&l.blocks.groups[..]);
         self.levels.iter().map(of_level).sum::<usize>() + self.masks.bytes()
     }
 
     /// The brick of level 0.
     pub fn root(&self) -> Child {
-        Child { node: 0, exists: 1, part: self.part(0, 0, 0, &mut 0) }
+        Child { node: 0, exists: 1, part: self.part(0, 0, 0, &mut Parent::default()) }
     }
 
     /// The split octants of a node.
@@ -336,8 +366,9 @@ impl Nodes {
         if split == 0 {
             return Family::default();
         }
-        let blocks = &self.levels[l as usize + 1].blocks[n as usize..];
-        Family { split, bricks: brick::parents(split), block: [blocks[0], blocks[1]] }
+        let blocks = &self.levels[l as usize + 1].blocks;
+        let block = [blocks.get(n as usize), blocks.get(n as usize + 1)];
+        Family { split, bricks: brick::parents(split), block }
     }
 
     /// The placement of the node's brick.
@@ -360,13 +391,13 @@ impl Nodes {
     pub fn check_invariants(&self) {
         for (l, level) in (0..).zip(&self.levels) {
             for (n, &split) in (0..).zip(&level.split) {
-                let [start, end] = [0, 1].map(|k| self.levels[l as usize + 1].blocks[n + k].node);
+                let [start, end] = [n, n + 1].map(|n| self.levels[l as usize + 1].blocks.get(n)[0]);
                 let children = brick::parents(split).count_ones();
                 assert_eq!(start + children, end, "children of node {n} of level {l} must follow");
             }
-            for (n, block) in level.blocks.windows(2).enumerate() {
-                let mut all = [0; 8];
-                self.masks.block(block[0].part(block[1], 0), |_, octants| {
+            for n in 0..level.blocks.len - 1 {
+                let (mut all, block) = ([0; 8], [n, n + 1].map(|n| level.blocks.get(n)));
+                self.masks.block(part_of(block, 0), |_, octants| {
                     let has_common = brick::any(&both(&all, &octants, |a, b| a & b));
                     assert!(!has_common, "block {n} of level {l}: a leaf has two components");
                     all = both(&all, &octants, |a, b| a | b);
@@ -506,7 +537,7 @@ mod tests {
     #[should_panic(expected = "children of node 1 of level 4 must follow")]
     fn a_wrong_link_is_found() {
         let (mut nodes, _) = Nodes::new(&tree(&[0, 1 << 12]), &Ownership::solo());
-        nodes.levels[5].blocks[2].node += 1;
+        nodes.levels[5].blocks.groups[0].1[2][0] += 1;
         nodes.check_invariants();
     }
 
@@ -515,7 +546,7 @@ mod tests {
     fn a_leaf_of_two_components_is_found() {
         let (mut nodes, _) = Nodes::new(&tree(&[0]), &Ownership::solo());
         // The first component of the next block becomes one of this block, too.
-        nodes.levels[1].blocks[1].component += 1;
+        nodes.levels[1].blocks.groups[0].1[1][1] += 1;
         nodes.check_invariants();
     }
 }

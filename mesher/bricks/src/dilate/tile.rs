@@ -19,8 +19,7 @@ struct Tile {
     side: usize,
     /// All zero in an empty tile.
     rows: Vec<u64>,
-    /// Masks of the tile's own positions: those along z that have a source; those along y that may have one, at any z
-    /// and at each z.
+    /// Masks of the tile's own positions that have a source: along z; along y, at any z and at each z.
     layers: u32,
     columns: u32,
     columns_at: [u32; TILE],
@@ -92,13 +91,18 @@ impl Tile {
             position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
         let rows = brick::to_rows(b.bits);
         let shift = MARGIN + x;
+        // Whether each row has a source, in the lowest of its four bits.
+        let pairs = rows | rows >> 1;
+        let has_source = (pairs | pairs >> 2) & 0x1111_1111_1111_1111;
         for dz in 0..4 {
-            if rows >> (16 * dz) & 0xffff == 0 {
+            // The product moves the bits of four rows next to each other.
+            let columns = (((has_source >> (16 * dz) & 0xffff) * 0x1248) >> 12 & 15) as u32;
+            if columns == 0 {
                 continue;
             }
             self.layers |= 1 << (z + dz);
-            self.columns |= 15 << y;
-            self.columns_at[z + dz] |= 15 << y;
+            self.columns |= columns << y;
+            self.columns_at[z + dz] |= columns << y;
             let base = (self.margin + z + dz) * self.side + self.margin + y;
             let four = rows >> (16 * dz);
             for (dy, row) in self.rows[base..base + 4].iter_mut().enumerate() {
