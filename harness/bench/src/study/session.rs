@@ -53,6 +53,8 @@ struct Planned {
     case: PathBuf,
     /// [`Base::inputs`] of the case from which it is derived.
     inputs: String,
+    /// Facets of its geometry.
+    facets: u64,
     repeats: usize,
     /// Whether an uncounted run of its mesh comes first.
     warm_up: bool,
@@ -279,7 +281,7 @@ impl Session<'_> {
         let case = base.write(setup.spacing_min, setup.layer_cells_min, in_own_root)?;
         let repeats = self.options.repeat.map_or(repeats, usize::from);
         let warm_up = setup.experiment != TARGETS || repeats > 1;
-        Ok(Planned { setup, case, inputs, repeats, warm_up, failed: false })
+        Ok(Planned { setup, case, inputs, facets: base.facets, repeats, warm_up, failed: false })
     }
 
     /// Returns a case, with facets for each of some ranks if they are given; writes its geometry as a binary STL file, once.
@@ -405,6 +407,8 @@ impl Session<'_> {
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
     fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<()> {
         Failure::unless(run.cells > 0, "the mesh has no cells")?;
+        let why = format!("it reports {} facets, and the case has {}", run.facets, point.facets);
+        Failure::unless([0, point.facets].contains(&run.facets), why)?;
         let engine = self.runner.programs.named(&point.setup.engine);
         let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {

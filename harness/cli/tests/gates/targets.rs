@@ -287,6 +287,17 @@ fn a_replay_makes_the_runs_of_the_archive_and_no_others() {
     assert_eq!(fs::read_to_string(fixture.path("calls")).unwrap().lines().count(), runs);
 }
 
+/// The time of a mesh of another geometry is no result.
+#[test]
+fn a_run_of_other_facets_than_the_case_has_fails() {
+    let fixture = scripted();
+    fixture.write("mesher", &MESHER.replace("\"facets\": 40", "\"facets\": 39"));
+    fixture.write("study.toml", "[[series]]\ncase = 'case.toml'\nexperiment = 'strong'\n");
+    let bench = fixture.harness("bench study.toml --mesher ./mesher");
+    let why = "it reports 39 facets, and the case has 40";
+    assert!(bench.code == 1 && bench.printed.contains(why), "{}", bench.printed);
+}
+
 /// The report says why.
 #[test]
 fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
@@ -312,7 +323,8 @@ fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
 fn an_edited_case_is_another_one() {
     let fixture = scripted();
     let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
-    fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
+    let mesher = MESHER.replace("\"digest\"", phases).replace("\"facets\": 40, ", "");
+    fixture.write("mesher", &mesher);
     let case = "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'sphere'\nfacets = 80\n";
     fixture.write(
         "study.toml",
