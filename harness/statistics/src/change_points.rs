@@ -174,16 +174,15 @@ impl<'a> Model<'a> {
     fn steps(&mut self, least: f64, alpha: f64) -> Vec<f64> {
         let (series, n) = (Series::new(self.values, self.phi), self.values.len() as f64);
         loop {
-            let (edges, fits, variance) =
-                (self.edges(), self.fits(&series), self.variance(&series));
+            let (ends, fits, variance) = (self.edges(), self.fits(&series), self.variance(&series));
             let least = match self.mean {
                 Mean::Constant => least,
                 Mean::Linear => least.max(STEP_MIN * variance.sqrt()),
             };
             let p_value = |i: usize| {
-                let middle = edges[i + 1] as f64 - 0.5;
+                let middle = ends[i + 1] as f64 - 0.5;
                 let is_small = (fits[i + 1].at(middle) - fits[i].at(middle)).abs() <= least;
-                let one = series.fit(edges[i], edges[i + 2], self.mean).cost;
+                let one = series.fit(ends[i], ends[i + 2], self.mean).cost;
                 let more = (one - fits[i].cost - fits[i + 1].cost).max(0.0);
                 let ratio = (variance + more / n) / variance;
                 // exp(-x / 2) is the tail of the chi-squared distribution with two degrees of freedom, and above that with one. So this
