@@ -34,7 +34,7 @@ step() {
     local name="$1" code spent TIMEFORMAT='%R %U %S'
     shift
     log "$name"
-    # In a shell of its own, which -e or `fail` may end. `||` would switch -e off.
+    # In a shell of its own, which -e or `fail` may end. `||` would switch -e off, also after a call of this function.
     set +e
     { spent="$({ time { (set -e; "$@") >&4 2>&3; }; } 2>&1)"; code=$?; } 3>&2 4>&1
     set -e

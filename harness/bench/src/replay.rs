@@ -87,11 +87,9 @@ impl Expected {
         let all = || lines.iter().filter_map(Line::run);
         let seconds = all().map(|run| run.time_launch_s).sum();
         let warm_ups = all().filter(|run| run.warm_up).map(|run| run.time_launch_s);
-        let longest =
-            |group: &Group| group.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
+        let longest = |of: &Group| of.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
         let seconds_once = warm_ups.chain(groups.all.iter().map(longest)).sum();
-        let named = |group: &Group| values(group.setup.to_string(), &groups, group);
-        let values = groups.all.iter().flat_map(named).collect();
+        let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
         let runs = groups.all.iter().map(|group| (group.setup.clone(), group.runs.len())).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
@@ -101,18 +99,17 @@ impl Expected {
         Ok(expected)
     }
 
-    /// How often each run may be repeated in that many seconds; `None` for as often as the study does.
+    /// The runs, and how often each may be repeated in that many seconds: no more often than in the record.
     ///
     /// # Errors
     /// If one repetition takes longer.
-    pub fn repeats_within(&self, limit_s: f64) -> Result<Option<u16>> {
-        if self.seconds <= limit_s {
-            return Ok(None);
-        }
-        let (repeats, once) = ((limit_s / self.seconds_once) as u16, duration(self.seconds_once));
+    pub fn runs_within(&self, limit_s: f64) -> Result<Vec<(Setup, usize)>> {
+        let is_whole = self.seconds <= limit_s;
+        let most = if is_whole { usize::MAX } else { (limit_s / self.seconds_once) as usize };
+        let once = duration(self.seconds_once);
         let why = format!("one run of each took {once} on the archive's machine: give --minutes");
-        Failure::unless(repeats > 0, why)?;
-        Ok(Some(repeats))
+        Failure::unless(most > 0, why)?;
+        Ok(self.runs.iter().map(|(setup, count)| (setup.clone(), most.min(*count))).collect())
     }
 
     /// Executes the invariants at the head of this file.
@@ -127,17 +124,10 @@ impl Expected {
         assert!(self.seconds_once <= self.seconds + 1e-6, "one run takes longer than all");
     }
 
-    /// The name of the run that a run repeats.
-    fn name(&self, of: &Setup) -> String {
-        let close = self.runs.iter().map(|(setup, _)| setup).filter(|setup| setup.is_close(of));
-        close.min_by_key(|setup| *setup != of).unwrap_or(of).to_string()
-    }
-
     /// Compares with a record of the repetition.
     pub fn compare(&self, lines: &[Line]) -> Replayed {
         let groups = Groups::of(lines);
-        let named = |group: &Group| values(self.name(&group.setup), &groups, group);
-        let all: Vec<Value> = groups.all.iter().flat_map(named).collect();
+        let all: Vec<Value> = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
         let row = |expected: &Value| {
             let Value { run, quantity, .. } = expected;
             let measured = all.iter().find(|of| (&of.run, &of.quantity) == (run, quantity));
@@ -213,11 +203,11 @@ impl Replayed {
     }
 }
 
-/// The values of a group, whose run is called `run`.
-fn values(run: String, groups: &Groups, group: &Group) -> Vec<Value> {
+/// The values of a group.
+fn values(groups: &Groups, group: &Group) -> Vec<Value> {
     let (first, mut all) = (&group.runs[0], Vec::new());
     let mut add = |quantity: &str, found: Found| {
-        let (run, quantity) = (run.clone(), quantity.to_owned());
+        let (run, quantity) = (group.setup.to_string(), quantity.to_owned());
         all.push(Value { run, quantity, found });
     };
     let of_mesh = [
@@ -335,24 +325,6 @@ mod tests {
         assert_eq!(missing.count(Verdict::Missing), 8);
     }
 
-    /// Otherwise the other mesh would be missing.
-    #[test]
-    fn another_spacing_for_the_same_number_of_cells_is_another_mesh() {
-        let finer = |run: &mut Run| {
-            run.setup.spacing_min *= 0.9;
-            run.cells += 1;
-        };
-        let [near, far] = [0.9, 0.5].map(|by| {
-            expected().compare(&edited(|run| {
-                finer(run);
-                run.setup.spacing_min *= by;
-            }))
-        });
-        let counts =
-            [Verdict::Differs, Verdict::Missing].map(|v| [&near, &far].map(|r| r.count(v)));
-        assert_eq!(counts, [[2, 0], [0, expected().values.len()]]);
-    }
-
     #[test]
     fn a_ratio_over_another_base_is_not_compared() {
         let of = |comm, ranks: usize| {
@@ -387,8 +359,10 @@ mod tests {
         lines.extend(record([2.0, 2.0]));
         let expected = Expected::of(&lines).unwrap();
         assert_eq!((expected.seconds, expected.seconds_once), (40.0, 20.0));
-        let of = |limit_s: f64| expected.repeats_within(limit_s);
-        assert_eq!((of(40.0), of(39.0)), (Ok(None), Ok(Some(1))));
+        let of = |limit_s: f64| -> Result<Vec<usize>> {
+            Ok(expected.runs_within(limit_s)?.iter().map(|(_, count)| *count).collect())
+        };
+        assert_eq!((of(40.0), of(39.0)), (Ok(vec![2, 2]), Ok(vec![1, 1])));
         assert_eq!([52.0, 121.0].map(duration), ["52 seconds", "3 minutes"]);
         assert!(of(19.0).unwrap_err().why.contains("took 20 seconds"));
     }

@@ -166,6 +166,18 @@ fn steps_close_together_do_not_hide_each_other() {
         let three = [vec![1000.0; 8], vec![middle; 2], vec![last; 2], vec![7000.0; 2]].concat();
         assert_eq!(places(&three), [8, 10, 12]);
     }
+    for last in [
+        [2000.0, 3000.0, 4000.0, 5000.0],
+        [1100.0, 900.0, 1200.0, 800.0],
+        [1100.0, 1300.0, 1200.0, 1500.0],
+    ] {
+        for (old, count) in [(8, 4), (8, 3), (8, 2), (12, 2), (5, 2), (40, 2)] {
+            let levels =
+                [vec![1000.0; old], last.map(|level| vec![level; count]).concat()].concat();
+            let found: Vec<f64> = found(&levels).iter().map(|step| step.after).collect();
+            assert_eq!(found, last, "{count} values of each level after {old}");
+        }
+    }
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub struct Base {
     pub layer_cells_min: u32,
     /// Digest of the rules and the geometry of the unchanged case.
     pub inputs: String,
+    /// Number of facets of the geometry.
+    pub facets: u64,
     table: Table,
     root: Root,
     directory: PathBuf,
@@ -73,6 +75,7 @@ impl Base {
             spacing_min: case.root.edge_of(case.level_surface),
             layer_cells_min: case.layer_cells_min,
             inputs: digest_of([rules, stl]),
+            facets: case.facets.len() as u64,
             table,
             root: case.root,
             directory: place.to_owned(),

@@ -233,12 +233,9 @@ impl Spread {
     pub fn exact(values: &[f64]) -> Self {
         let at = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
         let keep = if values.len() <= BY_RANK_MAX { values } else { &[] };
-        Self {
-            sum: values.iter().sum(),
-            max: values.get(at).copied().unwrap_or(0.0),
-            at,
-            by_rank: keep.to_vec(),
-        }
+        let (sum, by_rank) = (values.iter().sum(), keep.to_vec());
+        let max = values.get(at).copied().unwrap_or(0.0);
+        Self { sum, max, at, by_rank }
     }
 
     /// The same without values rank by rank.
@@ -318,12 +315,6 @@ impl Setup {
         Self { engine, case, spacing_min, layer_cells_min, ranks: 1, ..Self::default() }
     }
 
-    /// Whether it repeats another one, maybe at another spacing, as programs of other meshes come to another one for a number of cells.
-    pub(crate) fn is_close(&self, of: &Self) -> bool {
-        let is_near = (0.71..1.41).contains(&(self.spacing_min / of.spacing_min));
-        is_near && Self { spacing_min: of.spacing_min, ..self.clone() } == *of
-    }
-
     /// Returns partitioner and weights, or `default`.
     pub fn division(&self) -> String {
         let chosen = format!("{} {}", self.partitioner, self.weights);
@@ -337,12 +328,9 @@ impl Setup {
 impl fmt::Display for Setup {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { engine, case, experiment, spacing_min, layer_cells_min: n, ranks, .. } = self;
-        let (comm, division) = (crate::name_of(&self.comm), self.division());
-        let of_series = self.series_cells.map_or(String::new(), |cells| format!(" of {cells:e}"));
-        write!(
-            f,
-            "{engine} {case} {experiment}{of_series} {spacing_min:e} n={n} {comm}:{ranks} {division}"
-        )
+        let (comm, by) = (crate::name_of(&self.comm), self.division());
+        let of = self.series_cells.map_or(String::new(), |cells| format!(" of {cells:e}"));
+        write!(f, "{engine} {case} {experiment}{of} {spacing_min:e} n={n} {comm}:{ranks} {by}")
     }
 }
 
@@ -400,13 +388,12 @@ impl Run {
     /// and at least that of any phase, or on simulated ranks a useful time, from which theirs is projected; times that a clock can show; and
     /// sums that are those of the ranks and of the phases, of which the slowest rank takes no longer than all phases on theirs.
     pub(crate) fn is_possible(&self) -> bool {
-        let Self { setup, time_wall_s, useful_s, phases, .. } = self;
+        let Self { setup, time_wall_s, useful_s, phases, counters, peak_rss_bytes, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
         let of_run = [useful_s.sum, *time_wall_s, self.time_launch_s, self.time_cpu_s];
         let of_phases =
             phases.iter().flat_map(|p| [&p.useful_s, &p.wall_s, &p.messages, &p.message_bytes]);
-        let mut spreads =
-            of_phases.chain(self.counters.values()).chain([useful_s, &self.peak_rss_bytes]);
+        let mut spreads = of_phases.chain(counters.values()).chain([useful_s, peak_rss_bytes]);
         let is_of_all = |of: &Spread| of.by_rank.is_empty() || of.by_rank.len() == setup.ranks;
         let is_by_rank = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();

@@ -116,14 +116,12 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
     let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
     let memory =
         lines.iter().find_map(Line::session)?.machine.memory_bytes as f64 * node_count() as f64;
-    let [needed, available] = [bytes, memory].map(|b| b / 1e9);
+    let [need, there] = [bytes, memory].map(|b| b / 1e9);
     let would = match () {
         () if time_s > limit.as_secs_f64() => {
             format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())
         }
-        () if bytes > memory => {
-            format!("need {needed:.0} GB of memory, and there are {available:.0} GB")
-        }
+        () if bytes > memory => format!("need {need:.0} GB of memory, and there are {there:.0} GB"),
         () => return None,
     };
     let (program, cells) = (&setup.engine, finest.cells as f64);

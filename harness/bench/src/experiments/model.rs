@@ -240,15 +240,14 @@ fn terms<'a>(
     of: &Quantities,
 ) -> Terms<'a> {
     if *kind == Kind::Counter {
-        let geometric =
-            (0..geometries).flat_map(|of| (0..GEOMETRIC).map(move |i| (i, of == geometry)));
+        let local = (0..geometries).flat_map(|of| (0..GEOMETRIC).map(move |i| (i, of == geometry)));
         let common = (GEOMETRIC..TERMS.len()).map(|i| (i, true));
         let term = |(kind, is_own): (usize, bool)| {
             let (name, of) = TERMS[kind];
             let value = if is_own { of(at) } else { 0.0 };
             Term { name, value, kind, is_own, is_even: kind >= GEOMETRIC }
         };
-        return geometric.chain(common).map(term).collect();
+        return local.chain(common).map(term).collect();
     }
     let [own, _] = traffic(name);
     let is_traffic = |key: &Key| TRAFFIC.iter().any(|what| key.1.starts_with(what));

@@ -64,8 +64,7 @@ fn parse(text: &str) -> Result<Network, String> {
     if let [[small, latency_s], .., [large, time_s]] = points[..] {
         let bandwidth_bytes_per_s = (large - small) / (time_s - latency_s);
         let network = Network { latency_s, bandwidth_bytes_per_s, measured: true, ..ASSUMED };
-        let is_near =
-            |[bytes, s]: &[f64; 2]| (0.125..8.0).contains(&(s / network.time_s(1.0, *bytes)));
+        let is_near = |[b, s]: &[f64; 2]| (0.125..8.0).contains(&(s / network.time_s(1.0, *b)));
         let grow = points.is_sorted_by(|a, b| a[0] < b[0] && 0.7 * a[1] < b[1]);
         if grow && latency_s > 0.0 && time_s > 10.0 * latency_s && points.iter().all(is_near) {
             return Ok(network);

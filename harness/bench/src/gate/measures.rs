@@ -119,9 +119,7 @@ impl Measures {
         let mut value: serde_json::Value = serde_json::from_slice(text).map_err(wrong)?;
         let of_report = value.get_mut("candidate_measures").map(serde_json::Value::take);
         let measures: Self = serde_json::from_value(of_report.unwrap_or(value)).map_err(wrong)?;
-        match measures.schema == SCHEMA {
-            true => Ok(measures),
-            false => Err(format!("schema {:?}, not {SCHEMA:?}", measures.schema)),
-        }
+        let why = format!("schema {:?}, not {SCHEMA:?}", measures.schema);
+        if measures.schema == SCHEMA { Ok(measures) } else { Err(why) }
     }
 }

@@ -36,7 +36,7 @@ use subject::{Counted, Subject, top_level};
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
 pub struct GateOptions {
-    /// A revision (built and kept), or a program [default: none; the candidate is only measured]
+    /// A revision (built), or a program [default: none; the candidate is only measured]
     #[arg(long, value_name = "REVISION|FILE")]
     pub baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]

@@ -179,14 +179,10 @@ pub struct GateReport {
 impl GateReport {
     /// Returns a report without layers.
     pub fn new(baseline: Option<Measured>, candidate_measures: Measures) -> Self {
-        Self {
-            schema: SCHEMA.to_owned(),
-            program: format!("harness {}", env!("CARGO_PKG_VERSION")),
-            baseline,
-            candidate: candidate_measures.of.clone(),
-            candidate_measures,
-            ..Self::default()
-        }
+        let candidate = candidate_measures.of.clone();
+        let program = format!("harness {}", env!("CARGO_PKG_VERSION"));
+        let schema = SCHEMA.to_owned();
+        Self { schema, program, baseline, candidate, candidate_measures, ..Self::default() }
     }
 
     /// Appends a layer, the one of correctness before all others: without a comparison there, no mesh of a case is accepted.

@@ -64,10 +64,11 @@ pub struct TimeRules {
 
 impl Default for TimeRules {
     fn default() -> Self {
+        let (rounds_min, rounds_max, budget_s) = (15, 120, 20.0);
         Self {
-            rounds_min: 15,
-            rounds_max: 120,
-            budget_s: 20.0,
+            rounds_min,
+            rounds_max,
+            budget_s,
             alpha: 0.001,
             effect_min: 1.0,
             effect_wanted: 10.0,

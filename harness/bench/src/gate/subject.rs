@@ -52,12 +52,8 @@ impl Subject {
     ///
     /// # Errors
     /// If the program is missing or does not build.
-    pub fn candidate(
-        options: &GateOptions,
-        engine: &Engine,
-        baseline: Option<&Self>,
-    ) -> Result<Self> {
-        let is_built = baseline.is_some_and(|subject| subject.measured.is_built());
+    pub fn candidate(options: &GateOptions, engine: &Engine, old: Option<&Self>) -> Result<Self> {
+        let is_built = old.is_some_and(|subject| subject.measured.is_built());
         let own = engine.program.to_string_lossy();
         let default = if is_built && !engine.is_given { WORKING_TREE } else { &own };
         let named = options.candidate.as_deref().unwrap_or(default);
@@ -125,8 +121,8 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));
-    let (builder, arguments) =
-        words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
+    let why = Failure::input("an empty build command");
+    let (builder, arguments) = words.split_first().ok_or(why)?;
     let mut command = Command::new(builder);
     command.args(arguments).current_dir(tree);
     let built = process::run(&mut command, &Watch::new("build", LIMIT, &place));

@@ -177,16 +177,14 @@ impl Quantity {
         let level = if self.first.is_some() { rules.alpha } else { rules.alpha.sqrt() };
         let is_significant = found.p <= level && size(found.effect) > least;
         let is_sure = found.low > 0.0 || found.high < 0.0;
-        let is_confirmed =
-            self.first.is_none_or(|first| is_sure && (first > 0.0) == (found.effect > 0.0));
+        let is_slower = found.effect > 0.0;
+        let is_confirmed = self.first.is_none_or(|first| is_sure && (first > 0.0) == is_slower);
         if is_significant && size(found.effect) > found.floor && is_confirmed {
-            return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
+            return if is_slower { Verdict::Regression } else { Verdict::Improvement };
         }
         let within = size(found.low) <= wanted && size(found.high) <= wanted;
-        match found.visible <= wanted && within && !is_significant {
-            true => Verdict::Unchanged,
-            false => Verdict::Inconclusive,
-        }
+        let is_known = found.visible <= wanted && within && !is_significant;
+        if is_known { Verdict::Unchanged } else { Verdict::Inconclusive }
     }
 }
 

@@ -99,39 +99,32 @@ pub fn shrink(
 }
 
 /// Writes `case.toml`, `body.stl` and `README.md` into a new directory, which appears when they are complete; returns the text of the README.
-/// `options` choose the program in the command that repeats the failure.
+/// `given` chooses the program in the command that repeats the failure.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write(
-    shrunk: &Shrunk,
-    options: &[&str],
-    staging: &Staging,
-    directory: &Path,
-) -> io::Result<String> {
-    shrunk.trial.case.write(staging.path())?;
-    let case = directory.join("case.toml").display().to_string();
-    let words = ["harness", "shrink", &case, "--test-only", "--check", &shrunk.fault.check];
+pub fn write(shrunk: &Shrunk, given: &[&str], staging: &Staging, out: &Path) -> io::Result<String> {
+    let Shrunk { trial, fault, facets_before, trials, .. } = shrunk;
+    trial.case.write(staging.path())?;
+    let case = out.join("case.toml").display().to_string();
+    let words = ["harness", "shrink", &case, "--test-only", "--check", &fault.check];
     // Arguments of a process contain no NUL, the one character that a shell cannot quote.
-    let line = shlex::try_join(words.into_iter().chain(options.iter().copied()));
+    let line = shlex::try_join(words.into_iter().chain(given.iter().copied()));
     let line = line.expect("no argument contains NUL");
-    let ranks = match shrunk.trial.ranks {
+    let ranks = match trial.ranks {
         Ranks::Serial => String::new(),
         Ranks::Mpi(ranks) => format!(" --ranks {ranks} --mpi"),
         Ranks::Simulated { ranks, seed } => format!(" --ranks {ranks} --seed {seed}"),
     };
     let minimal = if shrunk.minimal { "nothing more can be removed" } else { "the time is over" };
+    let size = size(trial);
     let text = format!(
-        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {line}{ranks}\n",
-        shrunk.fault,
-        shrunk.facets_before,
-        shrunk.trials,
-        size(&shrunk.trial)
+        "{fault}\n\nShrunk from {facets_before} facets in {trials} trials ({minimal}) to: {size}.\n\nTo repeat the failure:\n\n    {line}{ranks}\n"
     );
     fs::write(staging.path().join("README.md"), format!("# A case that fails\n\n{text}"))?;
     staging.publish(|made| {
-        fs::create_dir_all(directory.parent().unwrap_or(directory))?;
-        fs::rename(made, directory)
+        fs::create_dir_all(out.parent().unwrap_or(out))?;
+        fs::rename(made, out)
     })?;
     Ok(text)
 }

@@ -42,7 +42,7 @@ pub struct Study {
     /// Directory of the file; paths are relative to it.
     #[serde(skip)]
     pub directory: PathBuf,
-    /// In a replay, the runs that the archive has, and how often; no others are executed.
+    /// In a replay, the runs that are repeated, and how often; no others are executed.
     #[serde(skip)]
     pub repeated: Option<Vec<(Setup, usize)>>,
 }
@@ -244,6 +244,14 @@ impl Study {
         *setup == run.setup(spacing_min.unwrap_or(spacing), layer_cells_min.unwrap_or(n))
     }
 
+    /// Returns the case of a run of this study, its facets per rank, and whether it keeps its root; `None` for a run of another study.
+    pub(super) fn source(&self, setup: &Setup) -> Option<(&String, Option<usize>, bool)> {
+        let series = self.series.iter().find(|series| series.is_of(setup));
+        let mesh = self.mesh.get(&setup.case).filter(|_| setup.experiment == TARGETS);
+        let of_mesh = mesh.map(|mesh| (&mesh.case, None, mesh.cells.is_none()));
+        series.map(|series| (&series.case, series.facets, false)).or(of_mesh)
+    }
+
     /// Returns the setup of a line that this study does not ask for.
     pub fn unasked<'a>(&self, line: &'a Line) -> Option<&'a Setup> {
         let setup = line.setup()?;
@@ -377,6 +385,11 @@ impl Series {
         self.facets.map_or(case.clone().into(), |facets| grown(&case, facets))
     }
 
+    /// Whether the run is of this experiment on this case.
+    fn is_of(&self, setup: &Setup) -> bool {
+        (name_of(&self.experiment), self.name()) == (setup.experiment.clone(), setup.case.clone())
+    }
+
     /// Whether it is a run of this series, of any program if that names none, or a serial one in place of it. `cells` are those of the mesh, if that is ours: meshes of others may be far from
     /// what was asked for, and where the number of cells jumps with the spacing, ours are not close either.
     fn asks_for(&self, setup: &Setup, cells: Option<u64>) -> bool {
@@ -390,7 +403,7 @@ impl Series {
             None => cells.is_none_or(|cells| (0.25..4.0).contains(&(cells as f64 / asked))),
         };
         let division = (setup.weights.as_str(), setup.partitioner.as_str());
-        (name_of(&self.experiment), self.name()) == (setup.experiment.clone(), setup.case.clone())
+        self.is_of(setup)
             && has_ranks
             && (self.layers.is_empty() || self.layers.contains(&setup.layer_cells_min))
             && (self.cells.is_empty() || self.cells.iter().any(fits))

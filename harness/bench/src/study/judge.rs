@@ -72,8 +72,7 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
         let Setup { experiment, engine, case, .. } = &run.setup;
         [([engine, engine], &run.program), ([experiment, case], &run.inputs)]
     }
-    let last: HashMap<[&String; 2], &String> =
-        of_sessions().filter_map(Line::run).flat_map(made).collect();
+    let last: HashMap<_, &String> = of_sessions().filter_map(Line::run).flat_map(made).collect();
     let is_last = |run: &Run| made(run).into_iter().all(|(what, of)| last[&what] == of);
     of_sessions().filter(|line| line.run().is_none_or(is_last)).cloned().collect()
 }
@@ -135,14 +134,13 @@ impl Judged {
     /// Returns the verdict.
     pub fn verdict(&self) -> Verdict {
         let Row { at_least, at_most, .. } = self.row;
-        // NaN is within no bounds.
-        let is_high = |value: f64| at_least.is_none_or(|least| value >= least);
-        let is_low = |value: f64| at_most.is_none_or(|most| value <= most);
+        // NaN is not within them.
+        let bounds = at_least.unwrap_or(f64::NEG_INFINITY)..=at_most.unwrap_or(f64::INFINITY);
         match self.measured {
             None if self.failed => Verdict::Failed,
             None => Verdict::LeftOut,
             Some(_) if at_least.or(at_most).is_none() => Verdict::ForComparison,
-            Some((value, _)) if is_high(value) && is_low(value) => Verdict::Met,
+            Some((value, _)) if bounds.contains(&value) => Verdict::Met,
             Some(_) => Verdict::Missed,
         }
     }

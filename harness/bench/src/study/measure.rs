@@ -72,11 +72,10 @@ pub static MEASURES: [Measure; 15] = [
     }),
     measure("seconds", Alone, (1.0, 3, " s"), |s| Ok(s.run().time_s.value)),
     measure("speed_up", Against, PLAIN, |s| match [s.against.cells(), s.run().cells()] {
-        [before, cells] if before != cells => Err(format!(
-            "the runs are of different meshes, of {} and {} cells",
-            grouped(before),
-            grouped(cells)
-        )),
+        [before, cells] if before != cells => {
+            let [before, cells] = [before, cells].map(grouped);
+            Err(format!("the runs are of different meshes, of {before} and {cells} cells"))
+        }
         _ => Ok(s.against.time_s.value / s.run().time_s.value),
     }),
     measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rates().value / s.against.rates().value)),

@@ -1,12 +1,11 @@
 //! A study with its cases, geometries and engines in one directory, so that it can be executed elsewhere.
 
 use super::Study;
-use super::file::Series;
 use super::judge::of_last_origin;
 use crate::experiments::cases::Base;
 use crate::experiments::entry::{Line, Run};
 use crate::experiments::machine::digest_of;
-use crate::{name_of, read_toml};
+use crate::read_toml;
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
 use run::engine::paths::Paths;
@@ -72,10 +71,8 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<
     let place = tempfile::tempdir()?;
     let last = of_last_origin(lines);
     let of_run = |run: &Run| {
-        let s = &run.setup;
-        let is_of = |of: &&Series| name_of(&of.experiment) == s.experiment && of.name() == s.case;
-        let case = study.series.iter().find(is_of).map(|of| &of.case);
-        (case.unwrap_or_else(|| &study.mesh[&s.case].case), run.inputs.clone())
+        let (case, ..) = study.source(&run.setup).expect("the study asks for it");
+        (case, run.inputs.clone())
     };
     // Older runs do not state their inputs.
     let runs = last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty());

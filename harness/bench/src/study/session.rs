@@ -7,7 +7,7 @@ use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, judge, unjudged};
 use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    ASSUMED, Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, now_utc,
+    ASSUMED, Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, TARGETS, now_utc,
 };
 use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Meshes, another_mesh};
@@ -53,6 +53,8 @@ struct Planned {
     case: PathBuf,
     /// [`Base::inputs`] of the case from which it is derived.
     inputs: String,
+    /// Facets of its geometry.
+    facets: u64,
     repeats: usize,
     /// Whether an uncounted run of its mesh comes first.
     warm_up: bool,
@@ -115,12 +117,13 @@ pub fn measure(
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
+    let mut of_rows = study.row.iter().flat_map(Row::runs).map(|name| study.run[name].comm);
+    let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty())
+        || of_rows.any(|comm| comm == Comm::Mpi);
+    let is_missing = has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
     let program = launcher.program();
-    let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty());
-    let is_missing = session.mpi_left_out() == Some(NO_LAUNCHER)
-        && (has_mpi || rows.iter().any(|row| row.why == NO_LAUNCHER));
-    let missing =
-        is_missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()));
+    let why = format!("{} is missing: runs on MPI were left out", program.display());
+    let missing = is_missing.then_some(why);
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
 
@@ -151,6 +154,9 @@ impl Session<'_> {
     fn all(&mut self, rows: &mut Vec<Judged>) -> Result<()> {
         self.open()?;
         let study = self.study;
+        if let Some(runs) = &study.repeated {
+            return self.repeat(runs);
+        }
         for (series, cells) in study.series.iter().flat_map(Series::sizes) {
             let points = self.of_series(series, cells)?;
             self.make(points)?;
@@ -162,6 +168,21 @@ impl Session<'_> {
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
             (self.progress)(&format!("row {number} of {}: {line}", study.row.len()));
             rows.push(judged);
+        }
+        Ok(())
+    }
+
+    /// Repeats the runs of an archive, each so often, at their spacings: a search would begin with other meshes and might end elsewhere.
+    fn repeat(&mut self, runs: &[(Setup, usize)]) -> Result<()> {
+        let (study, engines) = (self.study, self.study.engines());
+        let no_mpi = self.mpi_left_out().is_some();
+        let is_here = |s: &Setup| engines.contains(&s.engine) && !(no_mpi && s.comm == Comm::Mpi);
+        let series = |of: &(Setup, usize)| (of.0.experiment.clone(), of.0.case.clone());
+        for runs in runs.chunk_by(|a, b| series(a) == series(b)) {
+            let here = runs.iter().filter(|(of, _)| is_here(of) && study.source(of).is_some());
+            let points = here.map(|(of, repeats)| self.planned(of.clone(), *repeats));
+            let points = points.collect::<Result<_>>()?;
+            self.make(points)?;
         }
         Ok(())
     }
@@ -197,8 +218,8 @@ impl Session<'_> {
 
     /// Plans the runs of a series at one size.
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>> {
-        let mut base = self.base(&series.case, None)?;
-        let (n, inputs) = (base.layer_cells_min, base.inputs.clone());
+        let base = self.base(&series.case, None)?;
+        let n = base.layer_cells_min;
         let mut points = Vec::new();
         for engine in &series.engines {
             let description = &self.runner.programs.named(engine).description;
@@ -215,17 +236,12 @@ impl Session<'_> {
                 self.append(Entry::LeftOut(NoResult { setup, why }))?;
             }
             for setup in series.setups(engine, cells, n, &layouts) {
-                if let Some(facets) = series.facets {
-                    base = self.base(&series.case, Some([facets, setup.ranks]))?;
-                }
+                let base = self.base(&series.case, series.facets.map(|of| [of, setup.ranks]))?;
                 let parts = if series.experiment == Experiment::Weak { setup.ranks } else { 1 };
                 let finest = cells.map(|cells| self.spacing(&base, n, cells * parts as f64));
                 let finest = finest.transpose()?.unwrap_or(base.spacing_min);
                 let setup = Setup { spacing_min: finest * setup.spacing_min, ..setup };
-                let case = base.write(setup.spacing_min, setup.layer_cells_min, false)?;
-                let repeats = self.options.repeat.map_or(series.repeats, usize::from);
-                let (inputs, warm_up, failed) = (inputs.clone(), true, false);
-                points.push(Planned { setup, case, inputs, repeats, warm_up, failed });
+                points.push(self.planned(setup, series.repeats)?);
             }
         }
         Ok(points)
@@ -241,7 +257,7 @@ impl Session<'_> {
         })
     }
 
-    /// Plans the run of this name, and writes its case.
+    /// Plans the run of this name.
     fn of_run(&mut self, name: &str) -> Result<Planned> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
@@ -254,11 +270,18 @@ impl Session<'_> {
                 self.spacing(&base, n, cells)?
             }
         };
-        let case = base.write(spacing, n, mesh.cells.is_none())?;
-        let repeats = self.options.repeat.map_or(spec.repeats, usize::from);
-        let setup = spec.setup(spacing, n);
-        let inputs = base.inputs;
-        Ok(Planned { setup, case, inputs, repeats, warm_up: repeats > 1, failed: false })
+        self.planned(spec.setup(spacing, n), spec.repeats)
+    }
+
+    /// Plans a run of the study, and writes its case.
+    fn planned(&mut self, setup: Setup, repeats: usize) -> Result<Planned> {
+        let (case, facets, in_own_root) = self.study.source(&setup).expect("it is of the study");
+        let inputs = self.base(case, None)?.inputs;
+        let base = self.base(case, facets.map(|of| [of, setup.ranks]))?;
+        let case = base.write(setup.spacing_min, setup.layer_cells_min, in_own_root)?;
+        let repeats = self.options.repeat.map_or(repeats, usize::from);
+        let warm_up = setup.experiment != TARGETS || repeats > 1;
+        Ok(Planned { setup, case, inputs, facets: base.facets, repeats, warm_up, failed: false })
     }
 
     /// Returns a case, with facets for each of some ranks if they are given; writes its geometry as a binary STL file, once.
@@ -304,14 +327,6 @@ impl Session<'_> {
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
     /// a mesh, or would exceed the time or the memory, is not run on it.
     fn make(&mut self, mut points: Vec<Planned>) -> Result<()> {
-        if let Some(repeated) = &self.study.repeated {
-            points.retain_mut(|point| {
-                let of = repeated.iter().find(|(setup, _)| setup.is_close(&point.setup));
-                let most = of.filter(|_| self.options.repeat.is_none()).map(|(_, most)| *most);
-                point.repeats = point.repeats.min(most.unwrap_or(usize::MAX));
-                of.is_some()
-            });
-        }
         let is_known = self.lines.iter().any(|line| line.network().is_some());
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
             self.measure_network()?;
@@ -392,6 +407,8 @@ impl Session<'_> {
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
     fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<()> {
         Failure::unless(run.cells > 0, "the mesh has no cells")?;
+        let why = format!("it reports {} facets, and the case has {}", run.facets, point.facets);
+        Failure::unless([0, point.facets].contains(&run.facets), why)?;
         let engine = self.runner.programs.named(&point.setup.engine);
         let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {

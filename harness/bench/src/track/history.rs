@@ -174,19 +174,15 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
-        let suffix = match record.machine.as_str() {
-            "" => String::new(),
-            machine => machines.suffix("", machine),
-        };
+        let machine = &record.machine;
+        let suffix = if machine.is_empty() { String::new() } else { machines.suffix("", machine) };
         let mut of_geometry = record.geometries.clone();
         of_geometry.iter_mut().for_each(|(case, of)| *of = geometries.suffix(case, of));
         let named = |(mut name, value): (String, f64)| {
             // The others depend on the program and the case alone.
             let of_machine = [MEMORY, "memory", "time", "instructions", "allocations"];
-            if has_gain(&name)
-                || unit(&name) == "s"
-                || of_machine.iter().any(|of| plain(&name).contains(of))
-            {
+            let is_measured = has_gain(&name) || unit(&name) == "s";
+            if is_measured || of_machine.iter().any(|of| plain(&name).contains(of)) {
                 name += &suffix;
             }
             let is_of = |case: &str| name.strip_prefix(case).is_some_and(|of| of.starts_with('/'));

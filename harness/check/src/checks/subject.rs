@@ -51,18 +51,9 @@ impl<'a> Subject<'a> {
     ) -> Self {
         let inputs = case.map_or(manifest, |case| &case.rules);
         let inputs = Manifest { tree, sides: manifest.sides, ..inputs.clone() };
-        Self {
-            manifest,
-            case,
-            terms: inputs.of_leaves(),
-            inputs,
-            promises: Promises::of_definition(),
-            mesh: None,
-            reference: None,
-            pass,
-            truth: Rc::default(),
-            with_deleted: OnceCell::new(),
-        }
+        let (terms, promises) = (inputs.of_leaves(), Promises::of_definition());
+        let (mesh, reference, truth, with_deleted) = Default::default();
+        Self { manifest, case, terms, inputs, promises, mesh, reference, pass, truth, with_deleted }
     }
 
     /// The subject with the T0 that the harness makes for another mesh of the same case.

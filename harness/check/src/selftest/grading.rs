@@ -117,11 +117,8 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
 }
 
 /// Merges the first graded siblings whose level and surroundings satisfy a predicate.
-fn merge_where(
-    s: &SelftestCase,
-    predicate: impl Fn(u8, &Surroundings) -> bool,
-) -> Option<Vec<u64>> {
-    let fit = |&i: &usize| predicate(word::level(s.mesh.words[i]), &surroundings(s, i));
+fn merge_where(s: &SelftestCase, holds: impl Fn(u8, &Surroundings) -> bool) -> Option<Vec<u64>> {
+    let fit = |&i: &usize| holds(word::level(s.mesh.words[i]), &surroundings(s, i));
     Some(merge(&s.mesh.words, &[graded_siblings(s).into_iter().find(fit)?]))
 }
 

@@ -132,13 +132,11 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8> {
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
     expected.missing.extend(require_made(&study, &lines, &Paths::find())?);
     expected.missing.iter().for_each(|why| eprintln!("harness: not in the archive: {why}"));
-    study.repeated = Some(expected.runs.clone());
-    let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
+    study.repeated = Some(expected.runs_within(f64::from(arguments.minutes) * 60.0)?);
     // A network that was given is no property of a machine. The last one is that of the values.
     let last = lines.iter().filter_map(Line::network).next_back().map(|(_, network)| network);
     let network = session.network.or(last.filter(|network| !network.measured));
-    let repeat = session.repeat.or(fitting);
-    let session = SessionOptions { repeat, network, ..session.clone() };
+    let session = SessionOptions { network, ..session.clone() };
     leave_out_missing(&mut study)?;
     let place = tempfile::tempdir()?;
     let temporary = place.path().join("replay.jsonl");
@@ -221,12 +219,10 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     Table { columns, rows, notes, ..Table::default() }
 }
 
-fn code(replayed: &Replayed, is_whole: bool) -> u8 {
+fn code(of: &Replayed, is_whole: bool) -> u8 {
     match () {
-        () if !replayed.holds() => EXIT_FAILED,
-        () if !is_whole || !replayed.is_judged() || replayed.count(Verdict::Missing) > 0 => {
-            EXIT_MISSING
-        }
+        () if !of.holds() => EXIT_FAILED,
+        () if !is_whole || !of.is_judged() || of.count(Verdict::Missing) > 0 => EXIT_MISSING,
         () => EXIT_HOLDS,
     }
 }

@@ -70,9 +70,8 @@ fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
         }
         for name in included(&text) {
             // As LaTeX does: relative to the main text, whichever includes it.
-            let [named, with_end] =
-                ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
-            let file = if named.is_file() || name.ends_with(".tex") { named } else { with_end };
+            let [named, tex] = ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
+            let file = if named.is_file() || name.ends_with(".tex") { named } else { tex };
             if !paths.contains(&file) {
                 paths.push(file);
             }

@@ -41,11 +41,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             let place = (&*directory.join(name), LIMIT);
             let meshed = reference.mesh(&path, &SERIAL, ungraded, place);
             let read = meshed.and_then(|mesh| reference.read_mesh(&mesh));
-            read.map_err(|failure| match &failure.end {
-                End::Missing(_) | End::Interrupted => Failure::from(failure),
-                _ => {
-                    Failure { code: EXIT_FAILED, why: format!("{failure}, on {}", path.display()) }
-                }
+            read.map_err(|ended| match &ended.end {
+                End::Missing(_) | End::Interrupted => Failure::from(ended),
+                _ => Failure { code: EXIT_FAILED, why: format!("{ended}, on {}", path.display()) },
             })
         };
         let case = Case::read(&path)?;

@@ -256,6 +256,48 @@ fn an_incomplete_record_gives_no_green_replay() {
     assert!(twice.code == 0 && twice.printed.contains("repeat 2"), "{}", twice.printed);
 }
 
+/// A search for a spacing would begin with other meshes than it did, and mesh what the archive lacks.
+#[test]
+fn a_replay_makes_the_runs_of_the_archive_and_no_others() {
+    let fixture = scripted();
+    let cells = r#""$ranks" "$(awk '/^spacing_min/ { printf "%.0f", 9000 / $3 ^ 2 }' "$of")" >"#;
+    let mesher = MESHER
+        .replace("    --out)", "    *.toml) of=\"$1\"; echo run >>\"$here/calls\" ;;\n    --out)")
+        .replace("\"cells\": 1000", "\"cells\": %s")
+        .replace("\"$ranks\" >", cells);
+    fixture.write("mesher", &mesher);
+    let series = |of: &str| format!("[[series]]\ncase = 'case.toml'\nexperiment = {of}\n");
+    let layers = series("'layers'\nlayers = [1, 2]\ncells = [2e4]\nmpi = [1, 2]");
+    let study = |cells: &str| series(&format!("'strong'\ncells = {cells}")) + &layers;
+    fixture.write("study.toml", &study("[3e4]"));
+    for only in ["layers", "strong"] {
+        let bench = "bench study.toml --mesher ./mesher --no-mpi --report out --only";
+        let bench = fixture.harness(&format!("{bench} {only}"));
+        assert_eq!(bench.code, 0, "{}", bench.printed);
+    }
+    let archive = fixture.harness("archive out study.toml -o a --title T --author A --licence MIT");
+    assert_eq!(archive.code, 3, "{}", archive.printed);
+    fixture.write("a/study/study.toml", &study("[4e5, 3e4]"));
+    fs::remove_file(fixture.path("calls")).unwrap();
+    let replay = fixture.harness("replay a --mesher ./mesher");
+    assert!(replay.code == 3 && replay.printed.contains(" 0 differ"), "{}", replay.printed);
+    assert!(replay.printed.contains(" 0 missing"), "{}", replay.printed);
+    let record = fs::read_to_string(fixture.path("out/record.jsonl")).unwrap();
+    let runs = record.lines().filter(|line| line.contains("\"kind\":\"run\"")).count();
+    assert_eq!(fs::read_to_string(fixture.path("calls")).unwrap().lines().count(), runs);
+}
+
+/// The time of a mesh of another geometry is no result.
+#[test]
+fn a_run_of_other_facets_than_the_case_has_fails() {
+    let fixture = scripted();
+    fixture.write("mesher", &MESHER.replace("\"facets\": 40", "\"facets\": 39"));
+    fixture.write("study.toml", "[[series]]\ncase = 'case.toml'\nexperiment = 'strong'\n");
+    let bench = fixture.harness("bench study.toml --mesher ./mesher");
+    let why = "it reports 39 facets, and the case has 40";
+    assert!(bench.code == 1 && bench.printed.contains(why), "{}", bench.printed);
+}
+
 /// The report says why.
 #[test]
 fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
@@ -281,7 +323,8 @@ fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
 fn an_edited_case_is_another_one() {
     let fixture = scripted();
     let phases = r#""phases": [{"name": "all", "time_cpu_s": ['"$(seq -s, -f 0.00%.0f $ranks)"']}], "digest""#;
-    fixture.write("mesher", &MESHER.replace("\"digest\"", phases));
+    let mesher = MESHER.replace("\"digest\"", phases).replace("\"facets\": 40, ", "");
+    fixture.write("mesher", &mesher);
     let case = "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'sphere'\nfacets = 80\n";
     fixture.write(
         "study.toml",

@@ -173,8 +173,7 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
         Point { x: ranks, y, low, high }
     };
     let fitted = model.fitted;
-    let (seen, held_out): (Vec<_>, Vec<_>) =
-        of.iter().partition(|group| group.setup.ranks as f64 <= fitted);
+    let (seen, later): (Vec<_>, Vec<_>) = of.iter().partition(|g| g.setup.ranks as f64 <= fitted);
     let runs = |name: &str, style: usize, of: Vec<&&Group>| {
         let points = of.iter().map(|g| Point::exact(g.setup.ranks as f64, g.time_s.value));
         let runs = Series::new(name, Provenance::Projected, style, points.collect());
@@ -182,7 +181,7 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
     };
     let line = ranks.iter().map(modelled).collect();
     let line = Series::new("model and its band", Provenance::Modelled, 0, line);
-    let series = vec![line, runs("fitted runs", 0, seen), runs("held-out runs", 1, held_out)];
+    let series = vec![line, runs("fitted runs", 0, seen), runs("held-out runs", 1, later)];
     let caption = format!(
         "Run time of {}, {} cells, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: laws of exact counters, and a cost of \
          each by phase. The band has the width that held 90 % of such predictions in retrospect. Projected with {}.",

@@ -201,8 +201,8 @@ fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
     let Some(n) = numbers.iter().find(|number| number.key == *key) else {
         return Some(format!("the record has no result {key}"));
     };
-    let [here, there] =
-        [here, &[&n.value, &n.interval, &n.coverage, n.unit]].map(|of| of.join(" "));
+    let there = [&n.value, &n.interval, &n.coverage, n.unit].join(" ");
+    let here = here.join(" ");
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
@@ -214,9 +214,7 @@ fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
             Some(format!("{key} has no interval"))
         }
         ("value" | "interval" | "coverage" | "unit", _) => None,
-        _ => {
-            Some(format!("\\result has no option {option}: give value, interval, coverage or unit"))
-        }
+        _ => Some(format!("\\result has no option {option}: use value, interval, coverage, unit")),
     }
 }
 
@@ -235,8 +233,7 @@ fn rounds_to(number: &Number, literal: &str) -> bool {
 
 /// The digits before the power of ten of a number, without separators, and that power.
 fn mantissa(literal: &str) -> (String, i32) {
-    let literal =
-        ["{,}", "\\,", "~", ","].iter().fold(literal.to_owned(), |of, by| of.replace(by, ""));
+    let literal = literal.replace("{,}", "").replace("\\,", "").replace(['~', ','], "");
     let end = literal.find(['e', 'E', '\\', ' ']).unwrap_or(literal.len());
     let power = literal[end..].rsplit(['e', 'E', '^']).next().unwrap_or_default();
     let power = power.trim_matches(|c: char| !c.is_ascii_digit() && c != '-');

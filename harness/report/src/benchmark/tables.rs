@@ -51,8 +51,7 @@ fn experiment(groups: &Groups, name: &str) -> Table {
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
     };
     let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
-    let of_base =
-        |group: &Group, value: Option<f64>| shown(value.filter(|_| groups.has_reference(group)));
+    let of_base = |of: &Group, x: Option<f64>| shown(x.filter(|_| groups.has_reference(of)));
     let table = Table::of(
         name.to_owned(),
         &of,

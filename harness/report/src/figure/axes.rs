@@ -77,9 +77,8 @@ fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
     if let Some((low, high)) = axis.range {
         return low..high;
     }
-    let usable = values.into_iter().filter(|value| axis.shows(*value));
-    let (low, high) =
-        usable.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let shown = values.into_iter().filter(|value| axis.shows(*value));
+    let (low, high) = shown.fold((f64::INFINITY, -f64::INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     match (axis.log, low <= high) {
         (true, false) => 1.0..10.0,
         (false, false) => 0.0..1.0,

@@ -80,9 +80,8 @@ pub fn tex(figure: &Figure) -> String {
     );
     let plot = |(plot, s): (usize, &Series)| {
         let (style, id, name) = (s.style % COLOURS.len(), &figure.id, escape(&s.name));
-        let has_bars =
-            s.provenance != Provenance::Modelled && s.points.iter().any(|p| p.low < p.high);
-        let errors = if has_bars { ERRORS } else { "" };
+        let bars = s.provenance != Provenance::Modelled && s.points.iter().any(|p| p.low < p.high);
+        let errors = if bars { ERRORS } else { "" };
         match (s.kind, &s.points[..]) {
             (Kind::Line, [Point { x, .. }, ..]) => format!(
                 "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\

@@ -188,9 +188,8 @@ fn chart(
         let places: Vec<_> = points.iter().map(|point| chart.backend_coord(point)).collect();
         places.iter().for_each(|at| marker(page, *at, s));
         for (note, (x, y)) in s.notes.iter().zip(places) {
-            let circle =
-                html! { circle cx=(x) cy=(y) r="16" fill-opacity="0" { title { (note) } } };
-            above.push(circle.into_string());
+            let area = html! { circle cx=(x) cy=(y) r="16" fill-opacity="0" { title { (note) } } };
+            above.push(area.into_string());
         }
     }
     above

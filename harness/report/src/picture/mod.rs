@@ -144,11 +144,10 @@ impl Picture {
         let why = "the clip box has no area in the plane of the slice: give a larger one";
         Failure::unless(has_area, why)?;
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
-        let selection =
-            Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
+        let part = Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
         let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));
         let levels = squares::deepest(root.edge * scales[0].min(scales[1]));
-        let squares = Squares::collect(mesh, &selection, colour, levels, SQUARES_MAX)?;
+        let squares = Squares::collect(mesh, &part, colour, levels, SQUARES_MAX)?;
         let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
         Failure::unless(!squares.squares.is_empty(), why)?;
         let key = colour.key(&squares.squares.iter().map(|s| s.value).collect());
@@ -172,9 +171,8 @@ impl Picture {
             assert!((0..2).all(is_shown), "{square:?} is outside of {:?}", self.window);
             assert!(self.key.contains_key(&square.value), "{square:?} has no colour");
         }
-        let is_within =
-            |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
-        let beyond = self.section.iter().flatten().flatten().find(|p| !is_within(p));
+        let is_in = |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
+        let beyond = self.section.iter().flatten().flatten().find(|p| !is_in(p));
         assert!(beyond.is_none(), "the section leaves {:?} at {beyond:?}", self.window);
     }
 
