@@ -17,6 +17,7 @@ use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::octant::{Level, morton};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
 use tile::pass;
 
 /// Octants along a tile's edge.
@@ -121,16 +122,15 @@ impl Gathered {
 
     /// The set of all octants gathered. Blocks are put in order where they are: this is the largest set of a mesh.
     fn into_set(mut self) -> BrickSet {
-        let mut pages: Vec<_> = self.pages.into_iter().collect();
-        pages.sort_unstable_by_key(|page| page.0);
         let mut keys: Vec<u64> = Vec::with_capacity(self.words.len());
         let mut places: Vec<u32> = Vec::with_capacity(self.words.len());
-        for (page, blocks) in pages {
-            for (block, at) in (0..).zip(blocks).filter(|b| b.1 != NONE) {
+        for page in self.pages.keys().copied().collect::<BTreeSet<u64>>() {
+            for (block, &at) in (0..).zip(&self.pages[&page]).filter(|b| *b.1 != NONE) {
                 keys.push((page << PAGE_LOG2 | block) << BLOCK_LOG2);
                 places.push(at);
             }
         }
+        drop(self.pages);
         arrange(&mut self.words, &mut places);
         let keys = keys.iter().flat_map(|block| *block..block + BLOCK as u64);
         BrickSet::from_sorted(keys, self.words.into_flattened())
@@ -159,7 +159,6 @@ mod tests {
     use crate::octant::{morton, position};
     use crate::wide::widths;
     use proptest::prelude::*;
-    use std::collections::BTreeSet;
 
     fn naive(l: Level, codes: &BTreeSet<u64>, r: i64) -> BTreeSet<u64> {
         let n = 1i64 << l;
