@@ -98,7 +98,7 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
     let baseline = baseline.transpose()?;
     let candidate = Subject::candidate(options, engine, baseline.as_ref())?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir()?;
-    let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
+    let machine = machine::describe(&programs.paths.mpirun, &options.repository, "").label();
     let measures = Measures { machine, ..Measures::of_program(candidate.measured.clone()) };
     let of_baseline = baseline.as_ref().map(|subject| subject.measured.clone());
     let mut report = GateReport::new(of_baseline, measures);

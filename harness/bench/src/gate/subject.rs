@@ -131,8 +131,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         Failure { why, ..failure.into() }
     })?;
     let why = format!("the build succeeded, but {} is missing", program.display());
-    let why = format!("{label}: {why}: check [build] program");
-    Failure::unless(program.is_file(), why)?;
+    Failure::unless(program.is_file(), format!("{label}: {why}: check [build] program"))?;
     Ok(program)
 }
 

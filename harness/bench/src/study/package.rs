@@ -117,8 +117,7 @@ fn file_name(path: &Path) -> String {
 /// # Errors
 /// If it cannot be read or written, or the place has another file.
 pub fn copy(from: &Path, to: &Path) -> Result<()> {
-    let bytes = files::read(from).map_err(|error| Failure::at(from, error))?;
-    put(to, &bytes)
+    put(to, &files::read(from).map_err(|error| Failure::at(from, error))?)
 }
 
 /// Writes a file unless another one is there.

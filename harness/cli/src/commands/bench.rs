@@ -122,6 +122,7 @@ pub(super) fn execute(
     given: &Given,
 ) -> Result<Outcome> {
     let programs = programs(given, study)?;
+    let options = &SessionOptions { version: env!("VERSION"), ..options.clone() };
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
     let outcome = study::measure(options, record, study, &programs, &progress)?;
