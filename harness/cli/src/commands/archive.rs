@@ -196,8 +196,7 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
             (other, _) => format!("{other:?}").to_lowercase(),
         };
         let measured = row.measured.as_ref().map(shown).unwrap_or_default();
-        let expected = shown(found);
-        vec![run.clone(), quantity.clone(), expected, band(found), measured, verdict]
+        vec![run.clone(), quantity.clone(), shown(found), band(found), measured, verdict]
     };
     let mut rows = Vec::new();
     for of_run in replayed.0.chunk_by(|a, b| a.expected.run == b.expected.run) {

@@ -129,8 +129,7 @@ impl Picture {
         let clip = request.selection.clip;
         let slice = request.selection.slice;
         let slice = slice.unwrap_or_else(|| middle(&root, request.body, clip));
-        let axes = plane_axes(slice.axis);
-        let a = slice.axis;
+        let (axes, a) = (plane_axes(slice.axis), slice.axis);
         let is_within = clip.is_none_or(|[low, high]| (low[a]..=high[a]).contains(&slice.at));
         Failure::unless(is_within, NO_LEAF)?;
         let clip = clip.unwrap_or_else(|| {
