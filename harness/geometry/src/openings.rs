@@ -10,6 +10,7 @@
 use contract::lattice::{UNITS_PER_EDGE, sorted};
 use contract::octant::LEVEL_MAX;
 use contract::sets::Sets;
+use parry3d_f64::bounding_volume::BoundingVolume as _;
 
 use super::edges::{Edges, Use};
 use super::finding::{Finding, Kind, Place};
@@ -31,10 +32,10 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     // Without a spacing, any may be chosen, up to the finest.
     let finest = input.case.root.edge_of(LEVEL_MAX);
     let cell_in = |extent: &Aabb| input.cell_in(extent).unwrap_or(finest);
-    // Where the root cuts a body, its boundary closes the body, also where no leaf fits between them.
+    // Where the root cuts a body, its boundary closes the body, also where no leaf fits between them. A box near by may split it.
     rims.retain(|rim| {
         let ends = rim.ends.map(|v| Point::from(edges.points[v as usize]));
-        let cell = cell_in(&Aabb::from_points(ends));
+        let cell = cell_in(&Aabb::from_points(ends).loosened(input.cell.unwrap_or(0.0)));
         let is_beyond = |a: usize| {
             let at = ends.map(|end| end[a] - low[a]);
             at.iter().all(|at| *at < cell) || at.iter().all(|at| *at > edge - cell)
