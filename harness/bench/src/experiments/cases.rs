@@ -167,8 +167,7 @@ impl Sizes {
                     ((made / other.1).ln() / (other.0 / spacing).ln()).clamp(1.0, 3.0)
                 });
                 let guess = spacing * (made / cells).powf(1.0 / power);
-                let beyond = nearest_of(&|other| (other < cells) != (made < cells));
-                next = match beyond {
+                next = match nearest_of(&|other| (other < cells) != (made < cells)) {
                     _ if made < cells / 2.0 => {
                         let more = (cells / 2.0 / made).clamp(1.5, STEP);
                         // The exponent grows with refinement up to about 2; a smaller one would overshoot.

@@ -72,6 +72,7 @@ impl Runner<'_> {
         let counters = counters.map(|(name, of)| (name.clone(), spread(of)));
         let run = Run {
             program: machine::digest_of(engine.files()),
+            scripts: machine::digest_of_scripts(&engine),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi

@@ -4,6 +4,7 @@ use super::entry::Machine;
 use crate::git;
 use contract::digest::mix;
 use run::engine::process::printed;
+use run::engine::runner::Engine;
 use rustix::system::{sysinfo, uname};
 use std::fmt;
 use std::fs;
@@ -57,6 +58,12 @@ pub fn digest_of(files: impl IntoIterator<Item = PathBuf>) -> String {
         Some(Some(bytes.chunks(7).fold(start, step)))
     });
     digest.flatten().map_or(String::new(), |digest| format!("{digest:032x}"))
+}
+
+/// Returns the digest of those of an engine's files that an archive has. Interpreters and installed programs differ between machines.
+pub fn digest_of_scripts(engine: &Engine) -> String {
+    let here = &engine.description.here;
+    digest_of(engine.files().into_iter().filter(|file| file.starts_with(here)))
 }
 
 /// Returns the number of cores that this process may use.

@@ -124,8 +124,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
         let start = Instant::now();
         crate::announce(&format!("harness gate: {name}"));
         let cases = bench.asked(name).map(|case| case.name.clone()).collect();
-        let mut layer = Layer::new(name, cases);
-        let measures = &mut report.candidate_measures;
+        let (mut layer, measures) = (Layer::new(name, cases), &mut report.candidate_measures);
         match name {
             LayerName::Correctness => correctness::layer(bench, &mut layer)?,
             LayerName::Time => time::layer(bench, &mut layer),

@@ -87,8 +87,7 @@ pub fn shrink(
         // A trial that cannot be run does not count as the same failure.
         same(trial).is_ok_and(|fault| fault.is_some())
     };
-    let trial = reduce::reduce(given.clone(), &mut fails);
-    let minimal = !is_over();
+    let (trial, minimal) = (reduce::reduce(given.clone(), &mut fails), !is_over());
     let why = "the failure does not repeat: it depends on more than the case";
     let fault = same(&trial)?.ok_or_else(|| Failure::input(why))?;
     let shrunk = Shrunk { trial, fault, facets_before: given.case.facets.len(), trials, minimal };

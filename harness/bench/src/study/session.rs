@@ -301,8 +301,7 @@ impl Session<'_> {
 
     /// Executes the runs of a row that are not complete, and judges it.
     fn row(&mut self, row: &Row) -> Result<Judged> {
-        let study = self.study;
-        let mut points = Vec::new();
+        let (study, mut points) = (self.study, Vec::new());
         for name in row.runs() {
             if let Some(why) = self.mpi_left_out().filter(|_| study.run[name].comm == Comm::Mpi) {
                 return Ok(unjudged(row, false, why.to_owned()));

@@ -79,8 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     put(METADATA, pretty(&metadata(about, &members, &lines)))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
     let is_compared = |value: &&Value| !matches!(value.found, Found::Time(_));
-    let values = expected.values.iter().filter(is_compared).count();
-    let files = members.len() + 1;
+    let (values, files) = (expected.values.iter().filter(is_compared).count(), members.len() + 1);
     println!("{}: {files} files, {values} values to be met by a replay", out.display());
     expected.missing.iter().for_each(|why| println!("{why}"));
     Ok(if expected.missing.is_empty() { EXIT_HOLDS } else { EXIT_MISSING })

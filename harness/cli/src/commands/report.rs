@@ -62,8 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 /// written. Also returns whether a figure is that of an earlier report.
 fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)> {
     let own = directory.join("numbers.tex").canonicalize().ok();
-    let (mut paths, mut all, mut next) = (vec![main.to_owned()], Vec::new(), 0);
-    let mut is_old = false;
+    let (mut paths, mut all, mut next, mut is_old) = (vec![main.to_owned()], Vec::new(), 0, false);
     while let Some(path) = paths.get(next).cloned() {
         next += 1;
         // Numbers and commands are the same in any encoding that LaTeX reads.

@@ -206,8 +206,7 @@ fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
     let Some(n) = numbers.iter().find(|number| number.key == *key) else {
         return Some(format!("the record has no result {key}"));
     };
-    let there = [&n.value, &n.interval, &n.coverage, n.unit].join(" ");
-    let here = here.join(" ");
+    let (there, here) = ([&n.value, &n.interval, &n.coverage, n.unit].join(" "), here.join(" "));
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
