@@ -42,8 +42,7 @@ pub fn shown(words: impl IntoIterator<Item = impl AsRef<OsStr>>) -> String {
         name.unwrap_or(word).to_string_lossy().replace('\0', "\u{fffd}")
     };
     let words: Vec<String> = words.into_iter().map(|of| word(of.as_ref())).collect();
-    let line = shlex::try_join(words.iter().map(String::as_str));
-    line.expect("zero bytes were replaced")
+    shlex::try_join(words.iter().map(String::as_str)).expect("zero bytes were replaced")
 }
 
 /// Returns what git prints in a directory; `None` if it fails.

@@ -173,8 +173,11 @@ impl Row {
             (Found::Ratio { low, high, how, .. }, Some(Found::Ratio { value, how: here, .. }))
                 if how == here =>
             {
-                let is_inside = (low..=high).contains(&value);
-                if is_inside { Verdict::Inside } else { Verdict::Outside }
+                if (low..=high).contains(&value) {
+                    Verdict::Inside
+                } else {
+                    Verdict::Outside
+                }
             }
             _ => Verdict::NotCompared,
         }

@@ -37,6 +37,7 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
         program: String::new(),
         facets: 12,
         inputs: String::new(),
+        scripts: String::new(),
         geometry: None,
         cells,
         digest: "0".repeat(32),

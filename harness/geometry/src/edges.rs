@@ -71,8 +71,7 @@ impl Edges {
         let mut corners = vec![None; facets.len()];
         let mut uses = Vec::with_capacity(3 * facets.len());
         for (&[a, b, c], facet) in numbers.iter().zip(0..) {
-            let is_copy = is_sliver(facet) && !first.contains(&facet);
-            if a == b || b == c || c == a || is_copy {
+            if a == b || b == c || c == a || is_sliver(facet) && !first.contains(&facet) {
                 continue;
             }
             corners[facet as usize] = Some([a, b, c]);
@@ -139,8 +138,7 @@ fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
     let bits = facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits()));
     let mut sorted: Vec<([u32; 3], u32)> = bits.zip(0..).collect();
     sorted.sort_unstable();
-    let mut numbers = vec![[0; 3]; facets.len()];
-    let mut points = Vec::new();
+    let (mut numbers, mut points) = (vec![[0; 3]; facets.len()], Vec::new());
     for same in sorted.chunk_by(|a, b| a.0 == b.0) {
         let number = points.len() as u32;
         same.iter().for_each(|&(_, corner)| numbers.as_flattened_mut()[corner as usize] = number);
@@ -179,8 +177,7 @@ pub fn stray(input: &Input, first: usize) -> Finding {
     let is_off = |[p, q]: [[i64; 3]; 2]| {
         let middle = Point::from_array([0, 1, 2].map(|a| (p[a] + q[a]) as f64 / 2.0));
         let around = Aabb::from_half_extents(middle, Point::splat(TOUCHING));
-        let touches = |facet| from_point(middle, tree.triangle(facet)) <= TOUCHING;
-        !tree.in_box(&around).any(touches)
+        !tree.in_box(&around).any(|facet| from_point(middle, tree.triangle(facet)) <= TOUCHING)
     };
     for (facet, corners) in (0..).zip(all).filter(|(_, corners)| !has_area(corners)) {
         let ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));

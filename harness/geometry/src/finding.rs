@@ -53,6 +53,8 @@ pub struct Place {
     pub at: [f64; 3],
     /// Openings: free width; thin walls and gaps: distance of the facets, which a twentieth of their area undercuts. In the user's units.
     pub width: Option<f64>,
+    /// Openings: whether the width is only an upper bound, because the rim is not flat.
+    pub is_at_most: bool,
 }
 
 impl Place {
@@ -104,7 +106,8 @@ impl Kind {
     /// Whether every occurrence can change the mesh's region. Openings, nested shells, duplicates and intersections are judged one by one.
     pub fn changes_region(self, input: &Input) -> bool {
         match self {
-            Self::NonManifoldOdd | Self::Overlaps => input.are_seeds_beyond != Some(true),
+            Self::NonManifoldOdd => input.are_seeds_beyond != Some(true),
+            Self::Overlaps => input.are_overlaps_meshed(),
             Self::Stray | Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => input.is_meshed(true),
             Self::ThinGaps => input.is_meshed(false),
@@ -198,11 +201,14 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
         Kind::Openings => format!(
             "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
-             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. The rim of a sheet counts, too; a sheet has no inside.",
+             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, the width is at most the number given: harness leak measures what passes. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
         Kind::Duplicates if finding.count_changing == 0 => {
             "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, are a wall only where the inside is meshed.".into()
+        }
+        Kind::Intersections | Kind::Overlaps if !input.are_overlaps_meshed() => {
+            "No effect: where solids overlap is outside, but enclosed, so that it is deleted like a cavity, and crossing leaves are deleted, too.".into()
         }
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()

@@ -5,7 +5,8 @@ use std::path::Path;
 use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
 use contract::lattice::Root;
-use contract::manifest::{ExtentBox, Keep};
+use contract::manifest::{Enclosed, ExtentBox, Keep};
+use contract::octant::LEVEL_MAX;
 use contract::parity::Parity;
 use contract::stl::{self, Body};
 use parry3d_f64::bounding_volume::BoundingVolume as _;
@@ -106,13 +107,25 @@ impl Input {
         table.entry("spacing_min").or_insert(f64::MAX.into());
         let case = Case::from_parts(&table.to_string(), facets)?;
         let cell = is_known.then(|| case.root.edge_of(case.level_surface));
-        let rays = vec![case.keep == Keep::Inside];
-        Ok(Self { case, are_seeds_beyond: None, rays, cell })
+        Ok(Self { rays: vec![case.keep == Keep::Inside], case, are_seeds_beyond: None, cell })
     }
 
     /// Whether the mesh has leaves within the body, or outside of it: by what the case keeps or, if it has seeds, by their rays.
     pub fn is_meshed(&self, is_inside: bool) -> bool {
         self.case.keep == Keep::All || self.rays.contains(&is_inside)
+    }
+
+    /// Whether a space that rays take for outside is meshed: with the inside, with enclosed space, or from a seed in the body's bounding box.
+    pub fn is_space_meshed(&self) -> bool {
+        let is_kept = self.case.enclosed == Enclosed::Keep;
+        self.is_meshed(true) || self.are_seeds_beyond.map_or(is_kept, |are_beyond| !are_beyond)
+    }
+
+    /// Whether an overlap of solids can change the region: such a space, crossing leaves in it, or one that may reach the root's boundary.
+    pub fn are_overlaps_meshed(&self) -> bool {
+        let cell = self.cell.unwrap_or(self.case.root.edge_of(LEVEL_MAX));
+        let is_cut = || self.case.keep_crossing || self.extent().margin < cell;
+        self.is_space_meshed() || self.are_seeds_beyond.is_none() && is_cut()
     }
 
     /// Edge length of the finest cells at a surface in a region of the user's units: those of the boxes that meet it, if they are finer.

@@ -40,11 +40,12 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
         };
         pairs.extend(others.into_iter().filter(|&g| f < g).filter(are_pair).map(|g| (f, g)));
     }
+    let are_meshed = input.are_overlaps_meshed();
     let is_rounding = |&(f, g): &(u32, u32)| {
         let agree = shells.outward(f).zip(shells.outward(g)).map(|(f, g)| f == g);
         let is_opposite = agree.map(|agree| agree == (dot(normal(facet(f)), normal(facet(g))) < 0));
         let is_shifted = is_opposite == Some(true) && !input.is_meshed(true);
-        input.are_seeds_beyond == Some(true) || depth((facet(f), facet(g)), is_shifted) <= ROUNDING
+        !are_meshed || depth((facet(f), facet(g)), is_shifted) <= ROUNDING
     };
     pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
     Finding {
@@ -101,8 +102,7 @@ pub fn intersect(a: &FacetLattice, b: &FacetLattice) -> bool {
 /// on the same side are not separated by that shift.
 fn depth((a, b): (&FacetLattice, &FacetLattice), is_opposite: bool) -> f64 {
     let along = |axis: [i64; 3]| overlap(a, b, axis) as f64 / (dot(axis, axis) as f64).sqrt();
-    let opposite = is_opposite.then(|| normal(a));
-    axes(a, b).chain(opposite).map(along).fold(f64::INFINITY, f64::min)
+    axes(a, b).chain(is_opposite.then(|| normal(a))).map(along).fold(f64::INFINITY, f64::min)
 }
 
 /// The length in which the projections of two triangles on an axis (up to 2^59) overlap, times that of the axis; not positive if they

@@ -1,15 +1,16 @@
-//! Openings: connected sets of open edges, that is, of edges with one facet, apart from T-junctions.
+//! Openings: connected sets of open edges, that is, of edges with one facet or its copies, apart from T-junctions.
 //!
 //! At a T-junction a vertex of one facet lies on an edge of another. Both facets have open edges there, but the surface has no
 //! hole. Two open edges that leave a vertex in the same direction cancel along the shorter one, until no such
 //! pair is left; what remains bounds openings.
 //!
 //! The free width of an opening is the least distance of two parallel lines that enclose its points, projected on the plane that they span.
-//! A ball that is wider does not pass through a flat opening.
+//! A ball that is wider does not pass through a flat opening; of another one, as of a slot around a pipe, it is an upper bound.
 
-use contract::lattice::UNITS_PER_EDGE;
+use contract::lattice::{UNITS_PER_EDGE, sorted};
 use contract::octant::LEVEL_MAX;
 use contract::sets::Sets;
+use parry3d_f64::bounding_volume::BoundingVolume as _;
 
 use super::edges::{Edges, Use};
 use super::finding::{Finding, Kind, Place};
@@ -21,26 +22,30 @@ const TOLERANCE: f64 = 2.0;
 
 /// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex.
 pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let open = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0]);
+    // Where all facets are copies of one, a surface ends of which every facet is there twice.
+    let corners = |of: &Use| edges.corners[of.facet as usize].map(sorted);
+    let is_open = |uses: &&[Use]| uses.iter().all(|of| corners(of) == corners(&uses[0]));
+    let open = edges.iter().filter(is_open).map(|uses| uses[0]);
     let tolerance = TOLERANCE * input.case.root.edge / UNITS_PER_EDGE as f64;
     let (low, edge) = (input.case.root.origin, input.case.root.edge);
     let mut rims = uncancelled(open.collect(), &edges.points, tolerance);
-    // Where the root cuts a body, its boundary closes the body.
+    // Without a spacing, any may be chosen, up to the finest.
+    let finest = input.case.root.edge_of(LEVEL_MAX);
+    let cell_in = |extent: &Aabb| input.cell_in(extent).unwrap_or(finest);
+    // Where the root cuts a body, its boundary closes the body, also where no leaf fits between them. A box near by may split it.
     rims.retain(|rim| {
-        let ends = rim.ends.map(|v| edges.points[v as usize]);
+        let ends = rim.ends.map(|v| Point::from(edges.points[v as usize]));
+        let cell = cell_in(&Aabb::from_points(ends).loosened(input.cell.unwrap_or(0.0)));
         let is_beyond = |a: usize| {
             let at = ends.map(|end| end[a] - low[a]);
-            at.iter().all(|at| *at <= tolerance) || at.iter().all(|at| *at >= edge - tolerance)
+            at.iter().all(|at| *at < cell) || at.iter().all(|at| *at > edge - cell)
         };
         !(0..3).any(is_beyond)
     });
     let mut places = places(&rims, &edges.points);
     let width = |place: &Place| place.width.unwrap_or(0.0);
     places.sort_by(|(a, _), (b, _)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
-    // Without a spacing, any may be chosen, up to the finest.
-    let finest = input.case.root.edge_of(LEVEL_MAX);
-    let leaks =
-        |(place, extent): &&(Place, Aabb)| width(place) >= input.cell_in(extent).unwrap_or(finest);
+    let leaks = |(place, extent): &&(Place, Aabb)| width(place) >= cell_in(extent);
     Finding {
         count: places.len() as u64,
         count_changing: places.iter().filter(leaks).count() as u64,
@@ -65,7 +70,8 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
         facets.dedup();
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
         let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
-        (Place { width: Some(free_width(&ends)), ..Place::new(facets, centre) }, extent)
+        let (width, is_at_most) = free_width(&ends);
+        (Place { width: Some(width), is_at_most, ..Place::new(facets, centre) }, extent)
     };
     labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }
@@ -134,8 +140,11 @@ const STEPS: i32 = 200;
 /// others make it small where the best direction is not one of two that are nearly as good.
 const ROUNDS: usize = 4;
 
-/// The free width of a set of at least one point, or slightly more.
-fn free_width(points: &[[f64; 3]]) -> f64 {
+/// Depth of a rim across its plane, in widths, from which on it is not flat. The rounding of vertices is less.
+const FLAT: f64 = 1e-3;
+
+/// The free width of a set of at least one point, or slightly more, and whether it is only an upper bound, as the points are not in one plane.
+fn free_width(points: &[[f64; 3]]) -> (f64, bool) {
     let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
     let farthest = |offset: &dyn Fn(Point) -> Point| {
         let offsets = points.iter().map(|&p| offset(p));
@@ -148,14 +157,15 @@ fn free_width(points: &[[f64; 3]]) -> f64 {
     let (length, height) = (along.length(), across.length());
     // Rounding leaves points of one line at a distance from it.
     if height <= 1e-12 * length {
-        return 0.0;
+        return (0.0, false);
     }
     let v = across / height;
-    let width = |angle: f64| {
-        let heights = points.iter().map(|&p| (p - from).dot(v * angle.cos() + u * angle.sin()));
+    let extent = |along: Point| {
+        let heights = points.iter().map(|&p| (p - from).dot(along));
         let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
         high - low
     };
+    let width = |angle: f64| extent(v * angle.cos() + u * angle.sin());
     // Across `v`, the points are at most twice as wide as the height; at a greater angle, `along` alone is wider.
     let (mut best, mut reach) = ((width(0.0), 0.0), (2.0 * height / length).min(1.0).asin());
     for _ in 0..ROUNDS {
@@ -165,7 +175,7 @@ fn free_width(points: &[[f64; 3]]) -> f64 {
         best = tried.fold(best, |best, next| if next.0 < best.0 { next } else { best });
         reach /= f64::from(STEPS);
     }
-    best.0
+    (best.0, extent(u.cross(v)) > FLAT * best.0)
 }
 
 #[cfg(test)]
@@ -217,14 +227,14 @@ mod tests {
 
     #[test]
     fn a_slit_is_as_wide_as_its_short_side() {
-        let slit = free_width(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
+        let slit = free_width(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]).0;
         assert!((slit - 0.5).abs() < 1e-9, "{slit}");
     }
 
     #[test]
     fn a_circle_is_as_wide_as_its_diameter_for_few_and_many_points() {
         for n in [64, 1000, 5000] {
-            let width = free_width(&circle(n, 2.0));
+            let width = free_width(&circle(n, 2.0)).0;
             assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
         }
     }
@@ -252,7 +262,8 @@ mod tests {
                 at.rotate_left(turn);
                 at
             }).collect();
-            let found = free_width(&points);
+            let (found, is_at_most) = free_width(&points);
+            prop_assert!(!is_at_most);
             let expected = if least.is_finite() { least } else { 0.0 };
             let range = expected - 1e-9..=1.04 * expected + 1e-9;
             prop_assert!(range.contains(&found), "{} instead of {}", found, expected);
@@ -266,7 +277,7 @@ mod tests {
     #[test]
     fn a_rim_with_three_points_on_a_line_is_as_wide_as_the_others_are_far_from_it() {
         let flat = [[-3, -6], [-8, 4], [-2, -8], [4, 4], [6, -8], [-7, 2]];
-        let rim = free_width(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0]));
+        let rim = free_width(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0])).0;
         // Of (-8, 4), (-7, 2) and (-2, -8), from (4, 4).
         assert!((rim - 24.0 / 5.0f64.sqrt()).abs() < 1e-9, "{rim:?}");
     }
@@ -274,7 +285,7 @@ mod tests {
     #[test]
     fn points_of_one_line_have_no_width() {
         let line = free_width(&[[0.0; 3], [0.1, 0.2, 0.3], [0.3, 0.6, 0.9]]);
-        assert_eq!(line, 0.0);
-        assert_eq!(free_width(&[[7.0; 3]; 2]), 0.0);
+        assert_eq!(line, (0.0, false));
+        assert_eq!(free_width(&[[7.0; 3]; 2]), (0.0, false));
     }
 }

@@ -87,7 +87,7 @@ impl Diagnosis {
         let cell = self.cell.unwrap_or(f64::INFINITY);
         for finding in &self.findings {
             let most = match finding.kind {
-                Kind::Openings => edges.open,
+                Kind::Openings => edges.all,
                 Kind::Intersections => facets * facets.saturating_sub(1) / 2,
                 _ => edges.all.max(*facets),
             };
@@ -136,8 +136,9 @@ impl Diagnosis {
         };
         let text = format!("\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0);
         writeln!(f, "{}", text.trim_end())?;
-        for Place { facets, facets_more, at, width } in places {
-            let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
+        for Place { facets, facets_more, at, width, is_at_most } in places {
+            let most = if *is_at_most { "at most " } else { "" };
+            let width = width.map(|width| format!(": {most}{}", self.with_cells(" wide", width)));
             let dots = if *facets_more > 0 { ", ..." } else { "" };
             let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
             let at = point(self.root.rounded(*at));
@@ -201,13 +202,13 @@ mod tests {
 
     #[test]
     fn wrong_answers_are_noticed() {
-        // A sphere with a hole, a copy of a facet and a flipped one, half beyond the root and in cells wider than itself.
+        // A sphere with a hole, a copy of a facet and a flipped one, in cells wider than itself.
         let mut facets = Generator::new(Shape::Sphere, 320).facets().unwrap();
         let is_within = |f: &[[f32; 3]; 3]| f.as_flattened().iter().all(|c| *c > 0.1);
         facets.remove(facets.iter().position(is_within).unwrap());
         facets.push(facets[100]);
         facets[200].swap(0, 1);
-        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let root = Root { origin: [-8.0; 3], edge: 16.0 };
         let requested =
             Requested { spacing_min: Some(4.0), root: Some(root), ..Requested::default() };
         let right = diagnose(&Input::new(facets, requested).unwrap(), 5);

@@ -1,7 +1,6 @@
 //! Shells: components of facets that are connected by shared edges.
 
 use contract::lattice::{FacetLattice, dot, normal};
-use contract::manifest::Enclosed;
 use contract::parity::Parity;
 use contract::sets::Sets;
 use parry3d_f64::bounding_volume::BoundingVolume as _;
@@ -128,11 +127,8 @@ impl Shells {
             }
             let at = usize::from(shell.is_nested);
             // A solid in a solid is a space, which is meshed with what is around it, with enclosed space, or from a seed in it.
-            let is_enclosed_kept = input.case.enclosed == Enclosed::Keep;
-            let is_kept = input.are_seeds_beyond.map_or(is_enclosed_kept, |are_beyond| !are_beyond);
             let is_space = shell.is_nested && !(shell.is_oriented && shell.is_cavity);
-            let changes = is_space && (is_kept || input.is_meshed(true));
-            findings[at].count_changing += u64::from(changes);
+            findings[at].count_changing += u64::from(is_space && input.is_space_meshed());
             let facet = shell.facet_first;
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
         }

@@ -34,8 +34,7 @@ impl FacetTree {
         let firsts: Vec<u32> = firsts.map(|(number, _)| number).collect();
         let bounds = firsts.iter().map(|&n| triangles[n as usize].local_aabb()).enumerate();
         let boxes = Bvh::from_iter(BvhBuildStrategy::Binned, bounds);
-        let visits_max = (1024 * firsts.len() as u64).max(1 << 25);
-        Self { triangles, boxes, firsts, visits_max }
+        Self { visits_max: (1024 * firsts.len() as u64).max(1 << 25), triangles, boxes, firsts }
     }
 
     /// A facet.

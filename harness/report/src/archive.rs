@@ -43,10 +43,8 @@ pub struct About {
 
 /// The metadata: files with their sizes, sessions with command, machine and time, programs with their digests.
 pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
-    let is_address = about.licence.contains("://");
-    let place = if is_address { "" } else { "https://spdx.org/licenses/" };
-    let licence = format!("{place}{}", about.licence);
-    let id = |id: &str| json!({ "@id": id });
+    let place = if about.licence.contains("://") { "" } else { "https://spdx.org/licenses/" };
+    let (licence, id) = (format!("{place}{}", about.licence), |id: &str| json!({ "@id": id }));
     let file = |(path, bytes): &Member| json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string()});
     let files: Vec<Value> = members.iter().map(file).collect();
     let of_run = |line: &&Line| {

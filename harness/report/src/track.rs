@@ -23,8 +23,7 @@ pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
     let ends = [("from", records.first()), ("to", records.last())];
     let dated = |record: &Record| {
         let date = record.time.map(|time| time.strftime("%Y-%m-%d").to_string());
-        let date = date.as_deref().unwrap_or("no date");
-        html! { (linked(&record.commit, link)) " (" (date) ")" }
+        html! { (linked(&record.commit, link)) " (" (date.as_deref().unwrap_or("no date")) ")" }
     };
     let content = html! {
         p {

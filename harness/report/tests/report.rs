@@ -77,6 +77,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             command: "mesher uav.toml".into(),
             program: String::new(),
             inputs: String::new(),
+            scripts: String::new(),
             geometry: None,
             facets: 1000,
             cells,

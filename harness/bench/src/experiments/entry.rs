@@ -349,6 +349,9 @@ pub struct Run {
     pub command: String,
     /// Digest of the program's files; empty if one cannot be read.
     pub program: String,
+    /// Digest of those of its files that lie in the directory of the engine file, or below; empty without such, and in older records.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scripts: String,
     /// Facets of the geometry.
     pub facets: u64,
     /// Digest of the facets as the program read them, if it reports one.

@@ -72,6 +72,7 @@ impl Runner<'_> {
         let counters = counters.map(|(name, of)| (name.clone(), spread(of)));
         let run = Run {
             program: machine::digest_of(engine.files()),
+            scripts: machine::digest_of_scripts(&engine),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi
@@ -92,9 +93,10 @@ impl Runner<'_> {
             setup: setup.clone(),
         };
         let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
-        // As of milliseconds for seconds. Ranks within one process run in turn. Each may have threads, and a limit of cores be a fraction.
+        // As of milliseconds for seconds. Ranks within one process run in turn, and their wall time is of one. Each may have threads, and a limit of cores be a fraction.
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
-        let most_s = (1 + machine::cores()) as f64 * (run.time_launch_s + CLOCKS_S);
+        let wall_s = if setup.comm == Comm::Sim { run.time_launch_s } else { run.time_wall_s };
+        let most_s = (1 + machine::cores()) as f64 * (wall_s + CLOCKS_S);
         Failure::unless(run.is_possible() && busy_s <= most_s * node_count() as f64, why)?;
         Ok(run)
     }
@@ -131,8 +133,7 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
 /// Audits a mesh against the promises of the engine that made it.
 fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), String> {
     let case = Case::read(case).map_err(|error| error.to_string())?;
-    let promises = &engine.description.promises;
-    let report = audit_against(mesh, Some(&case), promises);
+    let report = audit_against(mesh, Some(&case), &engine.description.promises);
     let broken = report.checks.iter().find(|check| !check.holds());
     broken.map_or(Ok(()), |check| Err(format!("the mesh breaks the promise {check}")))
 }
@@ -278,14 +279,21 @@ mod tests {
     /// As of a program that takes milliseconds for seconds.
     #[test]
     fn phases_take_no_more_cpu_time_than_all_cores_have() {
-        let with = |cpu_s: &str, comm| {
+        let with = |cpu_s: &str, comm, more: &str| {
             let phases = format!(r#"[{{"name": "all", "time_cpu_s": {cpu_s}}}]"#);
-            let report = format!(r#"{{"cells": 8, "digest": "00", "phases": {phases}}}"#);
+            let report = format!(r#"{{"cells": 8, "digest": "00", "phases": {phases}, {more}}}"#);
             scripted(&format!("echo '{report}' > $2"), REPORTS, comm)
         };
-        assert!(with("[0.01]", Comm::Solo).is_ok());
-        for (cpu_s, comm) in [("[5e3]", Comm::Solo), ("[0.01, 5e3]", Comm::Sim)] {
-            assert!(with(cpu_s, comm).unwrap_err().contains("numbers that no run can have"));
+        let more = r#""facets": 0"#;
+        assert!(with("[0.01]", Comm::Solo, more).is_ok());
+        // The process takes longer than its own clock says.
+        let brief = r#""time_wall_s": 1e-6"#;
+        for (cpu_s, comm, more) in [
+            ("[5e3]", Comm::Solo, more),
+            ("[0.01, 5e3]", Comm::Sim, more),
+            ("[9.0]", Comm::Solo, brief),
+        ] {
+            assert!(with(cpu_s, comm, more).unwrap_err().contains("numbers that no run can have"));
         }
     }
 

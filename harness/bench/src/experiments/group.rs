@@ -272,9 +272,11 @@ impl Groups {
                 [s, o].map(|s| (case_of(s), s.layer_cells_min, &s.engine, s.comm == Comm::Sim));
             same_size && is_base && mesh == other
         };
-        // Fewest ranks first; among those the same communication, then the same experiment.
+        // Fewest ranks first; among those the same communication, then the same experiment, then the same series.
         let rank = |o: &&Group| {
-            (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
+            let o = &o.setup;
+            let is_other = o.experiment != s.experiment;
+            (o.ranks, o.comm != s.comm, is_other, o.series_cells != s.series_cells)
         };
         self.all.iter().filter(is_comparable).min_by_key(rank).unwrap_or(group)
     }

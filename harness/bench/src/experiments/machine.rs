@@ -4,14 +4,15 @@ use super::entry::Machine;
 use crate::git;
 use contract::digest::mix;
 use run::engine::process::printed;
+use run::engine::runner::Engine;
 use rustix::system::{sysinfo, uname};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Describes this machine; `mpirun` is the launcher's program, `place` a directory of the repository.
-pub fn describe(mpirun: &Path, place: &Path) -> Machine {
+/// Describes this machine; `mpirun` is the launcher's program, `root` the place of the oracles and of `version`, as the harness prints it.
+pub fn describe(mpirun: &Path, root: &Path, version: &str) -> Machine {
     Machine {
         cpu: cpu(&fs::read_to_string("/proc/cpuinfo").unwrap_or_default()),
         cores: cores(),
@@ -19,9 +20,17 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
         kernel: format!("Linux {}", uname().release().to_string_lossy()),
         mpi: first_line(Command::new(mpirun).arg("--version")),
         compiler: first_line(Command::new("rustc").arg("--version")),
-        commit: git(place, &["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
-            .unwrap_or_default(),
+        commit: commit(root, version),
     }
+}
+
+/// The commit of the repository at `root`, else that of which the harness was built, or its version: git would also answer for a
+/// repository around the place, such as that of a paper.
+fn commit(root: &Path, version: &str) -> String {
+    let is_ours = [".git", "harness/oracles/protocol.py"].iter().all(|of| root.join(of).exists());
+    let describe = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
+    let built = || version.split(['(', ')']).nth(1).unwrap_or(version).to_owned();
+    is_ours.then(|| git(root, &describe)).flatten().unwrap_or_else(built)
 }
 
 impl Machine {
@@ -49,6 +58,12 @@ pub fn digest_of(files: impl IntoIterator<Item = PathBuf>) -> String {
         Some(Some(bytes.chunks(7).fold(start, step)))
     });
     digest.flatten().map_or(String::new(), |digest| format!("{digest:032x}"))
+}
+
+/// Returns the digest of those of an engine's files that an archive has. Interpreters and installed programs differ between machines.
+pub fn digest_of_scripts(engine: &Engine) -> String {
+    let here = &engine.description.here;
+    digest_of(engine.files().into_iter().filter(|file| file.starts_with(here)))
 }
 
 /// Returns the number of cores that this process may use.
@@ -81,8 +96,7 @@ fn cpu(cpuinfo: &str) -> String {
 
 /// Returns the first line that a command prints; empty if it fails.
 fn first_line(command: &mut Command) -> String {
-    let text = printed(command).unwrap_or_default();
-    text.lines().next().unwrap_or_default().trim().to_owned()
+    printed(command).unwrap_or_default().lines().next().unwrap_or_default().trim().to_owned()
 }
 
 #[cfg(test)]
@@ -114,10 +128,20 @@ mod tests {
 
     #[test]
     fn this_machine_is_described_even_without_a_launcher() {
-        let machine = describe(Path::new("no-such-launcher"), Path::new("."));
+        let machine = describe(Path::new("no-such-launcher"), Path::new("."), "0.1.0");
         assert!(machine.cores > 0 && machine.mpi.is_empty() && machine.memory_bytes > 1 << 20);
         let release = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
         assert_eq!(machine.kernel, format!("Linux {}", release.trim()));
         assert!((0.0..1e4).contains(&load_average()));
+    }
+
+    /// A directory of this repository stands for one of a paper's.
+    #[test]
+    fn the_commit_is_not_that_of_a_repository_around_the_place() {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let of = |version| commit(here, version);
+        assert_eq!(["1.2.3 (0123abcd-dirty)", "1.2.3"].map(of), ["0123abcd-dirty", "1.2.3"]);
+        let root = here.join("../..");
+        assert_eq!(commit(&root, "1.2.3") == "1.2.3", !root.join(".git").exists());
     }
 }

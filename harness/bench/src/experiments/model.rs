@@ -188,8 +188,7 @@ impl Law {
         let row = |(s, [measured, max], terms): &(&Sample, Ends, Terms)| -> Row {
             let fitted = mean.at(&values(terms)).max(f64::MIN_POSITIVE);
             let all = excesses(measured * uneven(&mean, terms) / fitted, s.at.ranks);
-            let relative = all.map(|term| term / max);
-            (s.at.ranks, 1.0 - measured / max, relative[..excess_kinds].to_vec())
+            (s.at.ranks, 1.0 - measured / max, all.map(|term| term / max)[..excess_kinds].to_vec())
         };
         let is_fitted = |s: &Sample| key.0 == Kind::Phase || s.geometry == 0;
         let rows: Vec<Row> = known.iter().filter(|known| is_fitted(known.0)).map(row).collect();

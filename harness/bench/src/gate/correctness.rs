@@ -24,8 +24,7 @@ pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<()> {
     for case in bench.cases_of(LayerName::Correctness) {
         let report = verified(bench, &bench.candidate.engine, case)?;
         let baseline = bench.baseline.as_ref().map(|it| verified(bench, &it.engine, case));
-        let baseline = baseline.transpose()?;
-        layer.findings.extend(findings(case, &report, baseline.as_ref()));
+        layer.findings.extend(findings(case, &report, baseline.transpose()?.as_ref()));
     }
     Ok(())
 }
@@ -46,8 +45,7 @@ fn verified(bench: &Bench, engine: &Engine, case: &GateCase) -> Result<CaseRepor
         level_bases: Some(vec!["auto".to_owned()]),
         ..Options::of_leaves_alone(vec![case.file.to_string_lossy().into_owned()])
     };
-    let report = verify(&options, &programs)?;
-    let mut cases = report.cases.into_iter();
+    let mut cases = verify(&options, &programs)?.cases.into_iter();
     cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.name)))
 }
 

@@ -98,7 +98,7 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
     let baseline = baseline.transpose()?;
     let candidate = Subject::candidate(options, engine, baseline.as_ref())?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir()?;
-    let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
+    let machine = machine::describe(&programs.paths.mpirun, &options.repository, "").label();
     let measures = Measures { machine, ..Measures::of_program(candidate.measured.clone()) };
     let of_baseline = baseline.as_ref().map(|subject| subject.measured.clone());
     let mut report = GateReport::new(of_baseline, measures);
@@ -124,8 +124,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
         let start = Instant::now();
         crate::announce(&format!("harness gate: {name}"));
         let cases = bench.asked(name).map(|case| case.name.clone()).collect();
-        let mut layer = Layer::new(name, cases);
-        let measures = &mut report.candidate_measures;
+        let (mut layer, measures) = (Layer::new(name, cases), &mut report.candidate_measures);
         match name {
             LayerName::Correctness => correctness::layer(bench, &mut layer)?,
             LayerName::Time => time::layer(bench, &mut layer),

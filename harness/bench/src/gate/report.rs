@@ -135,8 +135,7 @@ impl Layer {
 
     /// Returns the worst verdict of the findings.
     pub fn verdict(&self) -> Verdict {
-        let worst = self.findings.iter().map(|finding| finding.verdict).max();
-        worst.unwrap_or(Verdict::LeftOut)
+        self.findings.iter().map(|finding| finding.verdict).max().unwrap_or(Verdict::LeftOut)
     }
 }
 

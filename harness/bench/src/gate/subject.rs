@@ -43,8 +43,11 @@ impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self> {
         engine.require()?;
         let program = digest_of(engine.files());
-        let measured = Measured { named, revision, program };
-        Ok(Self { engine, measured, counted: RefCell::default() })
+        Ok(Self {
+            engine,
+            measured: Measured { named, revision, program },
+            counted: RefCell::default(),
+        })
     }
 
     /// The candidate that the options name. By default it is a program given for the engine; else the working tree, built in the same way, if
@@ -131,8 +134,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         Failure { why, ..failure.into() }
     })?;
     let why = format!("the build succeeded, but {} is missing", program.display());
-    let why = format!("{label}: {why}: check [build] program");
-    Failure::unless(program.is_file(), why)?;
+    Failure::unless(program.is_file(), format!("{label}: {why}: check [build] program"))?;
     Ok(program)
 }
 

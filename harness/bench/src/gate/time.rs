@@ -176,8 +176,7 @@ impl Quantity {
         let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
         let level = if self.first.is_some() { rules.alpha } else { rules.alpha.sqrt() };
         let is_significant = found.p <= level && size(found.effect) > least;
-        let is_sure = found.low > 0.0 || found.high < 0.0;
-        let is_slower = found.effect > 0.0;
+        let (is_sure, is_slower) = (found.low > 0.0 || found.high < 0.0, found.effect > 0.0);
         let is_confirmed = self.first.is_none_or(|first| is_sure && (first > 0.0) == is_slower);
         if is_significant && size(found.effect) > found.floor && is_confirmed {
             return if is_slower { Verdict::Regression } else { Verdict::Improvement };

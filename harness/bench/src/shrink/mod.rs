@@ -73,8 +73,7 @@ pub fn shrink(
     limit: Duration,
     judge: impl Fn(&Trial) -> Result<Vec<Judged>>,
 ) -> Result<Shrunk> {
-    let start = Instant::now();
-    let mut trials = 1;
+    let (start, mut trials) = (Instant::now(), 1);
     let is_over = || start.elapsed() >= limit || interrupt::requested();
     let same = |trial: &Trial| -> Result<Option<Fault>> {
         let mut faults = judge(trial)?.into_iter().filter_map(|one| one.1);
@@ -88,12 +87,10 @@ pub fn shrink(
         // A trial that cannot be run does not count as the same failure.
         same(trial).is_ok_and(|fault| fault.is_some())
     };
-    let trial = reduce::reduce(given.clone(), &mut fails);
-    let minimal = !is_over();
+    let (trial, minimal) = (reduce::reduce(given.clone(), &mut fails), !is_over());
     let why = "the failure does not repeat: it depends on more than the case";
     let fault = same(&trial)?.ok_or_else(|| Failure::input(why))?;
-    let facets_before = given.case.facets.len();
-    let shrunk = Shrunk { trial, fault, facets_before, trials, minimal };
+    let shrunk = Shrunk { trial, fault, facets_before: given.case.facets.len(), trials, minimal };
     shrunk.check_invariants(&given, first);
     Ok(shrunk)
 }

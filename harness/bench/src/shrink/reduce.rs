@@ -17,8 +17,7 @@ pub type Fails<'a> = &'a mut dyn FnMut(&Trial) -> bool;
 pub fn reduce(trial: Trial, fails: Fails) -> Trial {
     let mut smallest = trial;
     loop {
-        let before = smallest.clone();
-        let coarser = coarser(&smallest);
+        let (before, coarser) = (smallest.clone(), coarser(&smallest));
         smallest = facets(first(smallest, fails, coarser), fails);
         // With all leaves kept, crossing and enclosed ones too, deletion is ruled out as a cause.
         let all = Some(Value::String("all".into()));

@@ -95,8 +95,7 @@ pub static MEASURES: [Measure; 15] = [
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
     measure("parallel_efficiency", Alone, PLAIN, |s| {
-        let parallel = s.run().efficiency(s.run()).map(|e| e.parallel());
-        parallel.ok_or(pop::UNKNOWN.to_owned())
+        s.run().efficiency(s.run()).map(|e| e.parallel()).ok_or(pop::UNKNOWN.to_owned())
     }),
     measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];

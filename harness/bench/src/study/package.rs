@@ -4,7 +4,7 @@ use super::Study;
 use super::judge::of_last_origin;
 use crate::experiments::cases::Base;
 use crate::experiments::entry::{Line, Run};
-use crate::experiments::machine::digest_of;
+use crate::experiments::machine::{digest_of, digest_of_scripts};
 use crate::read_toml;
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
@@ -84,11 +84,13 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<
     }
     for name in study.engines().iter().filter(|name| name.ends_with(".toml")) {
         let Ok(engine) = Engine::find(name, None, paths) else { continue };
-        // Installed programs differ between machines.
-        let is_packaged = engine.files().iter().all(|of| of.starts_with(&engine.description.here));
-        let digest = digest_of(engine.files());
-        let is_other = |run: &Run| run.setup.engine == engine.label() && run.program != digest;
-        let is_other = is_packaged && last.iter().filter_map(Line::run).any(is_other);
+        // Older records have no digest of the scripts alone.
+        let [all, own] = [digest_of(engine.files()), digest_of_scripts(&engine)];
+        let is_other = |run: &Run| {
+            let is_known = !run.scripts.is_empty() || own == all && run.program != all;
+            run.setup.engine == engine.label() && run.scripts != own && is_known
+        };
+        let is_other = last.iter().filter_map(Line::run).any(is_other);
         Failure::unless(!is_other, format!("{name}: its program is not that of the record"))?;
     }
     study.lacking(&last, paths)
@@ -117,8 +119,7 @@ fn file_name(path: &Path) -> String {
 /// # Errors
 /// If it cannot be read or written, or the place has another file.
 pub fn copy(from: &Path, to: &Path) -> Result<()> {
-    let bytes = files::read(from).map_err(|error| Failure::at(from, error))?;
-    put(to, &bytes)
+    put(to, &files::read(from).map_err(|error| Failure::at(from, error))?)
 }
 
 /// Writes a file unless another one is there.
@@ -267,7 +268,7 @@ mod tests {
             "s.toml",
             "[[series]]\nexperiment = 'strong'\ncase = 'ball.toml'\nengines = ['e.toml']\n",
         );
-        let made = |words: &str, edited: &str| {
+        let made = |words: &str, edited: &str, is_older: bool| {
             put("e.toml", &format!("{words}, '{{case}}', '{{out}}']\n"));
             put("mesh.sh", "true");
             let study = Study::read(&at("s.toml")).unwrap();
@@ -275,14 +276,18 @@ mod tests {
             let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
             (run.setup.weights, run.setup.partitioner) = Default::default();
             (run.setup.engine, run.program) = ("e".into(), digest_of(engine.files()));
+            run.scripts = if is_older { String::new() } else { digest_of_scripts(&engine) };
             put("mesh.sh", edited);
             require_made(&study, &of_ball(&[run]), &paths(place.path()))
         };
         let own = "program = '{here}/mesh.sh'\n[run]\nserial = ['{program}'";
-        assert_eq!(made(own, "true"), Ok(vec![]));
-        let why = made(own, "false").unwrap_err().why;
-        assert!(why.contains("e.toml: its program is not that of the record"), "{why}");
-        assert_eq!(made("[run]\nserial = ['sh', '{here}/mesh.sh'", "false"), Ok(vec![]));
+        let interpreted = "[run]\nserial = ['sh', '{here}/mesh.sh'";
+        for (words, is_older) in [(own, true), (own, false), (interpreted, false)] {
+            assert_eq!(made(words, "true", is_older), Ok(vec![]));
+            let why = made(words, "false", is_older).unwrap_err().why;
+            assert!(why.contains("e.toml: its program is not that of the record"), "{why}");
+        }
+        assert_eq!(made(interpreted, "false", true), Ok(vec![]));
     }
 
     #[test]

@@ -42,6 +42,9 @@ pub struct SessionOptions {
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value = "1800", value_parser = whole_seconds)]
     pub timeout: Duration,
+    /// What the harness prints as its version.
+    #[arg(skip)]
+    pub version: &'static str,
 }
 
 /// Why a row on MPI is left out without a launcher.
@@ -121,10 +124,8 @@ pub fn measure(
     let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty())
         || of_rows.any(|comm| comm == Comm::Mpi);
     let is_missing = has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
-    let program = launcher.program();
-    let why = format!("{} is missing: runs on MPI were left out", program.display());
-    let missing = is_missing.then_some(why);
-    Ok(Outcome { rows, lines: session.lines, interrupted, missing })
+    let why = format!("{} is missing: runs on MPI were left out", launcher.program().display());
+    Ok(Outcome { rows, lines: session.lines, interrupted, missing: is_missing.then_some(why) })
 }
 
 /// A running session.
@@ -189,11 +190,12 @@ impl Session<'_> {
 
     /// Records the circumstances.
     fn open(&mut self) -> Result<()> {
-        let programs = self.runner.programs;
+        let Runner { programs, launcher, .. } = self.runner;
+        let (root, version) = (&programs.paths.root, self.options.version);
         let lacks = |name: String| (name.clone(), programs.named(&name).description.lacks());
         let opening = Opening {
             command: std::env::args().collect(),
-            machine: machine::describe(&self.runner.launcher.program(), &programs.paths.root),
+            machine: machine::describe(&launcher.program(), root, version),
             nodes: machine::nodes(),
             load_average: machine::load_average(),
             lacks: self.study.engines().into_iter().map(lacks).collect(),
@@ -219,8 +221,7 @@ impl Session<'_> {
     /// Plans the runs of a series at one size.
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>> {
         let base = self.base(&series.case, None)?;
-        let n = base.layer_cells_min;
-        let mut points = Vec::new();
+        let (n, mut points) = (base.layer_cells_min, Vec::new());
         for engine in &series.engines {
             let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
@@ -291,8 +292,8 @@ impl Session<'_> {
             return Ok(known.clone());
         }
         (self.progress)(&format!("{case}: reading the geometry"));
-        let catalogue = &self.runner.programs.paths.catalogue;
-        let path = catalogue.case_file(case, &self.study.directory)?;
+        let paths = &self.runner.programs.paths;
+        let path = paths.catalogue.case_file(case, &self.study.directory)?;
         let base = Base::read(&path, per_rank, self.runner.place)?;
         self.bases.insert(key, base.clone());
         Ok(base)
@@ -300,11 +301,9 @@ impl Session<'_> {
 
     /// Executes the runs of a row that are not complete, and judges it.
     fn row(&mut self, row: &Row) -> Result<Judged> {
-        let study = self.study;
-        let mut points = Vec::new();
+        let (study, mut points) = (self.study, Vec::new());
         for name in row.runs() {
-            let is_mpi = study.run[name].comm == Comm::Mpi;
-            if let Some(why) = self.mpi_left_out().filter(|_| is_mpi) {
+            if let Some(why) = self.mpi_left_out().filter(|_| study.run[name].comm == Comm::Mpi) {
                 return Ok(unjudged(row, false, why.to_owned()));
             }
             if self.made.contains(name) {
@@ -339,8 +338,7 @@ impl Session<'_> {
             let engine = &self.runner.programs.named(&setup.engine).description;
             let declined = engine.declines(&Case::read(&mesh.1)?);
             let (is_declined, layout) = (declined.is_some(), (setup.ranks, setup.comm));
-            let too_much = || excess(&self.lines, &setup, self.runner.limit);
-            match declined.or_else(too_much) {
+            match declined.or_else(|| excess(&self.lines, &setup, self.runner.limit)) {
                 Some(why) => {
                     // What takes too long on one rank may not on two.
                     let is_left = |p: &&mut Planned| {
@@ -450,7 +448,7 @@ mod tests {
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
         let (no_mpi, repeat, network) = (true, None, None);
         let timeout = Duration::from_secs(60);
-        let options = SessionOptions { no_mpi, repeat, launcher, network, timeout };
+        let options = SessionOptions { no_mpi, repeat, launcher, network, timeout, version: "" };
         let record = at("record.jsonl");
         let outcome = measure(&options, &record, &study, &programs, &|_| ()).unwrap();
         let is_left_out = |line: &Line| match &line.entry {

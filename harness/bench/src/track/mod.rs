@@ -195,8 +195,7 @@ fn are_accepted(found: &[Step], points: &[(usize, f64)], records: &[Record]) -> 
     let mut all = vec![false; found.len()];
     for commit in (0..records.len()).filter(|i| records[*i].accepted) {
         let off = |(step, i): (&Step, usize)| Some((distance(points, step.at, commit)?, i));
-        let near = found.iter().zip(0..).filter_map(off).min();
-        near.into_iter().for_each(|(_, i)| all[i] = true);
+        found.iter().zip(0..).filter_map(off).min().into_iter().for_each(|(_, i)| all[i] = true);
     }
     all
 }

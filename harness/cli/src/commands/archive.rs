@@ -79,8 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     put(METADATA, pretty(&metadata(about, &members, &lines)))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
     let is_compared = |value: &&Value| !matches!(value.found, Found::Time(_));
-    let values = expected.values.iter().filter(is_compared).count();
-    let files = members.len() + 1;
+    let (values, files) = (expected.values.iter().filter(is_compared).count(), members.len() + 1);
     println!("{}: {files} files, {values} values to be met by a replay", out.display());
     expected.missing.iter().for_each(|why| println!("{why}"));
     Ok(if expected.missing.is_empty() { EXIT_HOLDS } else { EXIT_MISSING })
@@ -196,8 +195,7 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
             (other, _) => format!("{other:?}").to_lowercase(),
         };
         let measured = row.measured.as_ref().map(shown).unwrap_or_default();
-        let expected = shown(found);
-        vec![run.clone(), quantity.clone(), expected, band(found), measured, verdict]
+        vec![run.clone(), quantity.clone(), shown(found), band(found), measured, verdict]
     };
     let mut rows = Vec::new();
     for of_run in replayed.0.chunk_by(|a, b| a.expected.run == b.expected.run) {

@@ -72,8 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     }
     source.refuse_unused(&[mesh])?;
     let opened = source.open(mesh, case.as_ref())?;
-    let directory = &opened.dir;
-    let definition = balance.is_none();
+    let (directory, definition) = (&opened.dir, balance.is_none());
     let otherwise = Promises { definition, balance: *balance, ..Promises::default() };
     let promises = engine.as_ref().map_or(&otherwise, |engine| &engine.promises);
     let paths = Paths::find();

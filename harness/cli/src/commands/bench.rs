@@ -122,6 +122,7 @@ pub(super) fn execute(
     given: &Given,
 ) -> Result<Outcome> {
     let programs = programs(given, study)?;
+    let options = &SessionOptions { version: env!("VERSION"), ..options.clone() };
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
     let outcome = study::measure(options, record, study, &programs, &progress)?;
@@ -168,8 +169,7 @@ fn publish(study: &Study, rows: &[Judged], lines: &[Line], of: &Arguments) -> Re
     let table = targets(rows, &of.only);
     print!("{}", table.text());
     if let Some(directory) = &of.report {
-        let path = directory.join(PAGE);
-        let session = lines.iter().rev().find_map(Line::session);
+        let (path, session) = (directory.join(PAGE), lines.iter().rev().find_map(Line::session));
         let unknown = || "a machine that the record does not describe".to_owned();
         let machine = session.map_or_else(unknown, |session| session.machine.to_string());
         put(&path, markdown(&table, &machine)).map_err(unwritten(code))?;
@@ -234,8 +234,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let without = left.find(|of| !runs.contains(of));
-    let has_series = !study.series.is_empty();
+    let (without, has_series) = (left.find(|of| !runs.contains(of)), !study.series.is_empty());
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
         _ if has_series && runs.is_empty() => {

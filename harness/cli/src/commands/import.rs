@@ -60,8 +60,7 @@ impl Source {
     /// # Errors
     /// If any is given.
     pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<()> {
-        let is_read = self.format.is_some() || self.timeout.is_some();
-        let is_given = is_read || self.describes_cells();
+        let is_given = self.format.is_some() || self.timeout.is_some() || self.describes_cells();
         let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
         let why = "has a manifest, which states root and sides: omit the options for reading it";
         Failure::unless(is_used, format!("{} {why}", meshes[0].display()))

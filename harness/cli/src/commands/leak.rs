@@ -74,8 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let ends = match (arguments.from, arguments.to) {
         (Some(from), to) => vec![(from, to.unwrap_or(Target::Far))],
         (None, Some(to)) => {
-            let seed = leaks.seed(to)?.ok_or_else(|| format!("the case has no seeds: {START}"))?;
-            vec![(seed, to)]
+            vec![(leaks.seed(to)?.ok_or_else(|| format!("the case has no seeds: {START}"))?, to)]
         }
         (None, None) => {
             Progress.step("meshing the base tree of the case");

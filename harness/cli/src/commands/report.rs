@@ -7,6 +7,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, Result, 
 use report::benchmark::numbers::{Checked, Number, check, included};
 use report::benchmark::report;
 use std::collections::HashSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// `harness report`.
@@ -33,7 +34,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let mut code = EXIT_HOLDS;
     for main in &arguments.check {
         let mut all = 0;
-        for (path, text) in texts(main, &arguments.directory)? {
+        let (texts, is_outdated) = texts(main, &arguments.directory)?;
+        code = if is_outdated { EXIT_FAILED } else { code };
+        for (path, text) in texts {
             let shown = path.display();
             let Checked { compared, by_hand, findings } = check(&text, &numbers);
             findings.iter().for_each(|finding| println!("{shown}, {finding}"));
@@ -56,16 +59,19 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 /// Reads a text and those that it includes, without figures of reports, and without the numbers that the report in `directory` has just
-/// written.
-fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
+/// written. Also returns whether a figure is that of an earlier report.
+fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)> {
     let own = directory.join("numbers.tex").canonicalize().ok();
-    let (mut paths, mut all) = (vec![main.to_owned()], Vec::new());
-    let mut next = 0;
+    let (mut paths, mut all, mut next, mut is_old) = (vec![main.to_owned()], Vec::new(), 0, false);
     while let Some(path) = paths.get(next).cloned() {
         next += 1;
-        let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+        // Numbers and commands are the same in any encoding that LaTeX reads.
+        let bytes = files::read(&path).map_err(|error| Failure::at(&path, error))?;
+        let text = String::from_utf8_lossy(&bytes).into_owned();
         let is_figure = |line| line == r"\providecommand{\figures}{figures}";
-        if text.lines().take(3).any(is_figure) || path.canonicalize().ok() == own {
+        let is_figure = text.lines().take(3).any(is_figure);
+        is_old |= is_figure && is_outdated(&path, directory)?;
+        if is_figure || path.canonicalize().ok() == own {
             continue;
         }
         for name in included(&text) {
@@ -78,7 +84,24 @@ fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
         }
         all.push((path, text));
     }
-    Ok(all)
+    Ok((all, is_old))
+}
+
+/// Whether files beside a figure of a report, or below a list of figures, differ from those of the same name in `directory`; prints them.
+fn is_outdated(figure: &Path, directory: &Path) -> Result<bool> {
+    let mut is_outdated = false;
+    let made = fs::read_dir(directory.join("figures"))?.flatten().map(|entry| entry.path());
+    for made in made.chain([directory.join("figures.tex")]) {
+        let is_read = made.extension().is_some_and(|of| of == "tex" || of == "csv");
+        for of in ["", "figures"] {
+            let copy = figure.with_file_name(of).join(made.file_name().unwrap_or_default());
+            if is_read && copy.is_file() && fs::read(&copy)? != fs::read(&made)? {
+                println!("{}: differs from that of the report: copy it again", copy.display());
+                is_outdated = true;
+            }
+        }
+    }
+    Ok(is_outdated)
 }
 
 /// Reads records, writes the report into `directory` and prints a summary; returns the results.
@@ -119,8 +142,7 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>> {
         all.push(read);
     }
     // The last machine and the last build count, whatever the names of the files.
-    let end = |lines: &Vec<Line>| lines.last().map(|line| line.time_utc.clone());
-    all.sort_by_key(end);
+    all.sort_by_key(|lines: &Vec<Line>| lines.last().map(|line| line.time_utc.clone()));
     Ok(all.into_iter().flatten().collect())
 }
 

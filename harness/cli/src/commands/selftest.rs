@@ -28,8 +28,7 @@ pub struct Arguments {
 /// # Errors
 /// If a case cannot be meshed.
 pub fn run(arguments: &Arguments) -> Result<u8> {
-    let given = arguments.reference.as_deref();
-    let reference = Engine::find("reference", given, &Paths::find())?;
+    let reference = Engine::find("reference", arguments.reference.as_deref(), &Paths::find())?;
     reference.require()?;
     let scratch = tempfile::tempdir()?;
     let meshed = selftest::cases().into_iter().map(|(name, text)| {
@@ -38,10 +37,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         fs::write(&path, text)?;
         // The mesh, and the base tree T0.
         let made = |name, ungraded| {
-            let place = (&*directory.join(name), LIMIT);
-            let meshed = reference.mesh(&path, &SERIAL, ungraded, place);
-            let read = meshed.and_then(|mesh| reference.read_mesh(&mesh));
-            read.map_err(|ended| match &ended.end {
+            let meshed = reference.mesh(&path, &SERIAL, ungraded, (&*directory.join(name), LIMIT));
+            meshed.and_then(|mesh| reference.read_mesh(&mesh)).map_err(|ended| match &ended.end {
                 End::Missing(_) | End::Interrupted => Failure::from(ended),
                 _ => Failure { code: EXIT_FAILED, why: format!("{ended}, on {}", path.display()) },
             })

@@ -61,8 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
         Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
     };
-    let catalogue = &programs.paths.catalogue;
-    let path = catalogue.case_file(&arguments.case, Path::new(""))?;
+    let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let why = "is there already: remove it, or give another directory with --out";
@@ -72,8 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let staging = (!arguments.test_only).then(staging).transpose()?;
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::of(&Case::read(&path)?), ranks };
-    let judged = probe.judge(&trial)?;
-    let Some(first) = fault(&judged, arguments.check.as_deref())? else {
+    let Some(first) = fault(&probe.judge(&trial)?, arguments.check.as_deref())? else {
         println!("the case does not fail {}", arguments.check.as_deref().unwrap_or("any check"));
         return Ok(EXIT_HOLDS);
     };

@@ -32,7 +32,6 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Failure::unless(has_inputs || case.is_some(), why)?;
     let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{shown}: {why}"))?;
-    let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
-    print!("{}", mesh.at(arguments.point)?);
+    print!("{}", Mesh::of(&disk.manifest, &tree, body.as_ref()).at(arguments.point)?);
     Ok(EXIT_HOLDS)
 }

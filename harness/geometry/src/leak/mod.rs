@@ -193,8 +193,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     /// # Errors
     /// If a base tree cannot be made.
     pub fn regions(&mut self, leaks: &[Leak]) -> Result<Vec<[f64; 3]>> {
-        let edge = self.case.root.edge;
-        let level = |leak: &Leak| (edge / leak.spacing_coarse).log2().round() as u8;
+        let level = |leak: &Leak| (self.case.root.edge / leak.spacing_coarse).log2().round() as u8;
         let Some(finest) = leaks.iter().map(level).max() else { return Ok(Vec::new()) };
         let (of_finest, others): (Vec<&Leak>, Vec<&Leak>) =
             leaks.iter().partition(|leak| level(leak) == finest);

@@ -108,11 +108,10 @@ pub fn widest(
     (from, to): Ends,
     watch: &dyn Watch,
 ) -> Result<Passage> {
-    let facets = space.facets;
-    let before = approach(&space, from);
+    let (facets, before) = (space.facets, approach(&space, from));
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
-    let ends = (before[before.len() - 1], after.last().copied());
-    let mut search = Search { space, ends, watch };
+    let mut search =
+        Search { space, ends: (before[before.len() - 1], after.last().copied()), watch };
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
         let Place { at, clearance, .. } = way.points[way.narrowest()];
@@ -131,8 +130,7 @@ pub fn widest(
 /// The way from a point of a free leaf, in legs along the axes through free leaves, to where no step leads farther from the facets. A step is
 /// a leg or, where two or three walls are equally near and no single leg leads away from all, a leg along each of two or three axes.
 fn approach(space: &Space, from: Point) -> Vec<Point> {
-    let mut points = vec![from];
-    let mut clearance = space.facets.distance(from);
+    let (mut points, mut clearance) = (vec![from], space.facets.distance(from));
     let mut step = clearance / 2.0;
     let is_free = |at: Point| {
         root().contains_local_point(at) && space.cells[space.locate(at) as usize].is_open
@@ -146,8 +144,7 @@ fn approach(space: &Space, from: Point) -> Vec<Point> {
         let ways = directions.iter().map(|&d| way(d * step));
         let open = ways.filter(|way| way.windows(2).all(is_open));
         let reached = open.map(|way| (space.facets.distance(way[3]), way));
-        let farther = reached.filter(|to| to.0 > clearance);
-        match farther.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        match reached.filter(|to| to.0 > clearance).max_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((distance, way)) => {
                 points.extend(&way[1..]);
                 points.dedup();
@@ -258,8 +255,7 @@ fn described(
 ) -> Passage {
     /// Facets at the rim, in radii of the ball.
     const RIM: f64 = 1.05;
-    let unit = case.root.edge / UNITS_PER_EDGE as f64;
-    let narrowest = way.narrowest();
+    let (unit, narrowest) = (case.root.edge / UNITS_PER_EDGE as f64, way.narrowest());
     let Place { at, clearance, .. } = way.points[narrowest];
     let first = before.len() - 1;
     let inner = (first, first + way.points.len() - 1);

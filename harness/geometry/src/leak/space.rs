@@ -114,8 +114,7 @@ impl<'a> Space<'a> {
 
     /// The cell that contains a point of the root.
     pub fn locate(&self, at: Point) -> u32 {
-        let last = UNITS_PER_EDGE as f64 - 1.0;
-        self.at(at.to_array().map(|c| c.clamp(0.0, last) as u32))
+        self.at(at.to_array().map(|c| c.clamp(0.0, UNITS_PER_EDGE as f64 - 1.0) as u32))
     }
 
     fn at(&self, at: [u32; 3]) -> u32 {

@@ -78,8 +78,7 @@ fn over_cells(
         repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
     }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
-    let id = format!("{id}-{}", subject.file());
-    let title = format!("{title}: {mesh}");
+    let (id, title) = (format!("{id}-{}", subject.file()), format!("{title}: {mesh}"));
     let caption =
         format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
     let (x, y) = (Axis::log("cells"), Axis::log(y));
@@ -92,8 +91,7 @@ fn series(all: &[&Group], value: impl Fn(&Group) -> Median) -> Vec<Series> {
     for (engine, mut groups) in by_key(all.iter().copied(), |g| &g.setup.engine) {
         groups.sort_by_key(|g| (g.setup.ranks, g.cells()));
         for ((ranks, _), groups) in by_key(groups, |g| (g.setup.ranks, g.setup.comm)) {
-            let how = provenance(groups[0]);
-            let s = if ranks == 1 { "" } else { "s" };
+            let (how, s) = (provenance(groups[0]), if ranks == 1 { "" } else { "s" });
             let name = format!("{engine}, {ranks} rank{s}, {}", how.word());
             let points = groups.iter().map(|g| point(g.cells() as f64, value(g))).collect();
             lines.push(Series::new(&name, how, lines.len(), points));

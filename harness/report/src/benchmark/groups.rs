@@ -63,8 +63,7 @@ pub fn rank_times(groups: &[&Group]) -> String {
 /// The least and the greatest value, or the only one.
 pub fn range(groups: &[&Group], value: impl Fn(&Group) -> u64) -> String {
     let values = || groups.iter().map(|group| value(group));
-    let ends = [values().min(), values().max()];
-    distinct(ends.into_iter().flatten().map(grouped)).join(" to ")
+    distinct([values().min(), values().max()].into_iter().flatten().map(grouped)).join(" to ")
 }
 
 /// The groups of an experiment by engine and case, in the order of the record; those of each by ranks.

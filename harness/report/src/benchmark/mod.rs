@@ -50,8 +50,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     fs::create_dir_all(&place)?;
     let drawn: Vec<Drawn> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
-    let broken = page::broken(&groups, lines);
-    let page = directory.join("index.html");
+    let (broken, page) = (page::broken(&groups, lines), directory.join("index.html"));
     write(&page, page::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     let numbers = numbers(&groups);

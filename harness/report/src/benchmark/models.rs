@@ -42,8 +42,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     let of = |modelled @ (subject, of, _, model): &Modelled| {
         let (counters, times): (Vec<_>, Vec<_>) =
             model.formulas().into_iter().partition(|((kind, _), _)| *kind == Kind::Counter);
-        let title = format!("model of {}", described(*subject, of));
-        let notes = notes(modelled);
+        let (title, notes) = (format!("model of {}", described(*subject, of)), notes(modelled));
         let times = Table { notes, ..table(format!("{title}: seconds"), &times, model) };
         [times, table(format!("{title}: counters"), &counters, model)]
     };

@@ -99,11 +99,12 @@ pub fn tex(numbers: &[Number]) -> String {
 
 /// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths. A bracket after
 /// the first commands begins an interval or a short title. Before a word, `in` is one as well.
-const NOT_READ: [&str; 4] = [
+const NOT_READ: [&str; 5] = [
     r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
     r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
-    r"[0-9.]+(?:(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
+    r"\\definecolor\s*(?:\{[^}]*\}\s*){3}",
+    r"[0-9.]+(?:[ \t]*(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
 
 /// Digits with points, thousands separators, and a power of ten.
@@ -129,15 +130,19 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
     }
     let code = without(r"(?m)^\s*\\defresult.*$", &code);
     let uses = pattern(r"\\result\s*(?:\[([^\]]*)\])?\s*\{\s*([^}]*?)\s*\}");
-    found.extend(uses.captures_iter(&code).map(|of| {
+    // In a macro, a part of the key is an argument.
+    let whole = uses.captures_iter(&code).filter(|of| !of[2].contains('#'));
+    found.extend(whole.map(|of| {
         let option = of.get(1).map_or("value", |option| option.as_str());
         (of.get(0).map_or(0, |whole| whole.start()), misused(option, &of[2], numbers))
     }));
     let code = NOT_READ.iter().fold(code, |code, pattern| without(pattern, &code));
-    let named = found.len();
+    let (named, percent) = (found.len(), pattern(r"^(?:\\,|[~\s])*\\%"));
     for literal in all(LITERAL, &code).into_iter().filter(|number| is_result(number, &code)) {
         let number = literal.as_str();
-        let is_known = numbers.iter().any(|result| rounds_to(result, number));
+        // Per cent of a ratio, such as an efficiency.
+        let is_percent = percent.is_match(&text[literal.end()..]);
+        let is_known = numbers.iter().any(|result| rounds_to(result, number, is_percent));
         let why = || format!("{number} is written by hand, and no result rounds to it");
         found.push((literal.start(), (!is_known).then(why)));
     }
@@ -201,8 +206,7 @@ fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
     let Some(n) = numbers.iter().find(|number| number.key == *key) else {
         return Some(format!("the record has no result {key}"));
     };
-    let there = [&n.value, &n.interval, &n.coverage, n.unit].join(" ");
-    let here = here.join(" ");
+    let (there, here) = ([&n.value, &n.interval, &n.coverage, n.unit].join(" "), here.join(" "));
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
@@ -219,12 +223,12 @@ fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
 }
 
 /// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
-fn rounds_to(number: &Number, literal: &str) -> bool {
-    let (literal, power) = mantissa(literal);
+fn rounds_to(number: &Number, literal: &str, is_percent: bool) -> bool {
+    let (literal, mut power) = mantissa(literal);
+    power -= if is_percent && number.unit.is_empty() { 2 } else { 0 };
     let decimals = literal.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     let literal = &if literal.starts_with('.') { format!("0{literal}") } else { literal };
-    let ends = number.interval.split("--");
-    ends.chain([number.value.as_str()]).any(|text| {
+    number.interval.split("--").chain([number.value.as_str()]).any(|text| {
         let value: Result<f64, _> = text.replace(',', "").parse();
         let rounded = |value: f64| format!("{:.decimals$}", value / 10f64.powi(power));
         value.is_ok_and(|value| rounded(value) == *literal)
@@ -298,6 +302,13 @@ mod tests {
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\\\\[1.25in] \\vskip 1.25in\n\\href{http://x/1.999%20b}{b}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
         assert_eq!(check(right, &record), Checked { compared: 12, by_hand: 9, findings: vec![] });
+        let efficiency = [Number { unit: "", ..number("a/efficiency", "0.708", "") }];
+        let right = "\\newcommand{\\T}[1]{\\result{a/#1/time}}\\definecolor{c}{rgb}{0.123,0.456,0.789} \\hspace*{9.89 cm} 70.8\\,\\%, 70.8~\\% and 0.708";
+        assert_eq!(
+            check(right, &efficiency),
+            Checked { compared: 3, by_hand: 3, findings: vec![] }
+        );
+        assert_eq!(check("70.8 s, 0.71\\%", &efficiency).findings.len(), 1);
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
             ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),

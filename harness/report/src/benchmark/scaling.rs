@@ -187,8 +187,7 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
         Series::new("useful time", Provenance::Projected, 0, points).drawn_as(Kind::Scattered),
         Series::new(&format!("mean; λ = {lambda:.2}"), Provenance::Bound, 0, mean),
     ];
-    let margin = 0.02 * last;
-    let id = format!("per-rank-{}-{ranks}", subject.file());
+    let (margin, id) = (0.02 * last, format!("per-rank-{}-{ranks}", subject.file()));
     let title = format!("Useful time per rank: {subject}, {ranks} ranks");
     let x = Axis { range: Some((-margin, last + margin)), ..Axis::linear("rank") };
     let y = Axis::linear("useful time / s");
@@ -212,8 +211,7 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
     let is_weak = experiment == "weak";
     let time = |g: &Group, name: &str| {
         let phase = g.typical.phases.iter().find(|p| p.name == name);
-        let time_s = phase.map_or(0.0, |p| phase_s(&g.typical, p, &g.network));
-        time_s * g.setup.ranks as f64
+        phase.map_or(0.0, |p| phase_s(&g.typical, p, &g.network)) * g.setup.ranks as f64
     };
     let mut names: Vec<&str> = last.typical.phases.iter().map(|p| p.name.as_str()).collect();
     let time_max = |name: &str| simulated.iter().map(|g| time(g, name)).fold(0.0, f64::max);

@@ -87,8 +87,10 @@ fn experiment(groups: &Groups, name: &str) -> Table {
         format!("Factors of {engine} are left out (–), and its efficiencies are of run times: {UNKNOWN}.")
     });
     let clocks = clocks(groups.all.iter().filter(|g| g.setup.experiment == name));
-    let notes = above_one(&efficiencies).into_iter().chain(left_out).chain(clocks).collect();
-    Table { notes, ..table }
+    Table {
+        notes: above_one(&efficiencies).into_iter().chain(left_out).chain(clocks).collect(),
+        ..table
+    }
 }
 
 /// A median with so many decimals, if it is known.
@@ -179,8 +181,7 @@ fn comparison(groups: &Groups, (case, n): (String, u32), of: Vec<&Group>) -> Opt
     let all: Vec<&Group> = programs.into_iter().flat_map(|(_, of)| of).collect();
     let rate = |g: &Group| Some(g.cpu_s()?.falling(|s| g.cells() as f64 / s / 1e6));
     let search_s = |g: &Group| {
-        let phase = |run: &Run| Some(run.phases.iter().find(|p| p.name == "search")?.useful_s.sum);
-        g.median_of(phase)
+        g.median_of(|run: &Run| Some(run.phases.iter().find(|p| p.name == "search")?.useful_s.sum))
     };
     let table = Table::of(
         format!("programs on one core: {case}, n = {n}"),

@@ -41,8 +41,7 @@ pub fn width(text: &str) -> f64 {
 
 /// The left ends of the entries of a legend, which has as many rows as it needs, and its lower end. Names are beside symbols.
 pub fn legend(left: f64, names: &[&str]) -> (Vec<(i32, i32)>, f64) {
-    let (mut x, mut y) = (left, 36.0);
-    let mut places = Vec::new();
+    let (mut x, mut y, mut places) = (left, 36.0, Vec::new());
     for name in names {
         let entry = SYMBOL + width(name);
         if x > left && x + entry > WIDTH {

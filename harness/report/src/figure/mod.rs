@@ -278,8 +278,7 @@ pub mod samples {
     pub(crate) fn series(provenance: Provenance) -> Series {
         let points =
             [1.0, 2.0, 4.0].map(|x| Point { low: x * 0.9, high: x * 1.1, ..Point::exact(x, x) });
-        let name = format!("UAV, {}", provenance.word());
-        Series::new(&name, provenance, 0, points.to_vec())
+        Series::new(&format!("UAV, {}", provenance.word()), provenance, 0, points.to_vec())
     }
 }
 

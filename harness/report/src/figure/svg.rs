@@ -59,8 +59,7 @@ pub fn svg(figure: &Figure) -> String {
         None => (if figure.is_flat { 560 } else { 1040 }, RIGHT),
     };
     let mut drawn = String::new();
-    let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, height));
-    let page = backend.into_drawing_area();
+    let page = SVGBackend::with_string(&mut drawn, (WIDTH as u32, height)).into_drawing_area();
     for ((name, of), at) in legend_entries.iter().zip(places) {
         symbol(&page, at, of);
         let beside = if matches!(of, Symbol::Nothing) { 0 } else { SYMBOL as i32 };
@@ -261,8 +260,7 @@ fn bar<C: Clone>(corners: [C; 2], style: usize) -> [Rectangle<C>; 2] {
 
 /// The segments of bars that begin where the ones before them end.
 fn segments(lengths: &[Place], begins: &mut [f64], style: usize) -> Vec<Rectangle<Place>> {
-    let half = (1.0 - GAP) / 2.0;
-    let mut drawn = Vec::new();
+    let (half, mut drawn) = ((1.0 - GAP) / 2.0, Vec::new());
     for ((length, middle), begin) in lengths.iter().zip(begins).filter(|(of, _)| of.0 > 0.0) {
         drawn.extend(bar([(*begin, middle - half), (*begin + length, middle + half)], style));
         *begin += length;

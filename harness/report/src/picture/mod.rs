@@ -126,11 +126,9 @@ impl Picture {
         if colour == Colour::Rank {
             mesh.require_ranks()?;
         }
-        let clip = request.selection.clip;
-        let slice = request.selection.slice;
+        let (clip, slice) = (request.selection.clip, request.selection.slice);
         let slice = slice.unwrap_or_else(|| middle(&root, request.body, clip));
-        let axes = plane_axes(slice.axis);
-        let a = slice.axis;
+        let (axes, a) = (plane_axes(slice.axis), slice.axis);
         let is_within = clip.is_none_or(|[low, high]| (low[a]..=high[a]).contains(&slice.at));
         Failure::unless(is_within, NO_LEAF)?;
         let clip = clip.unwrap_or_else(|| {

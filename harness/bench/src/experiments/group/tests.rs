@@ -507,3 +507,16 @@ fn another_partition_on_fewer_ranks_is_no_base() {
     assert_eq!(bases(&two), [2, 4, 2]);
     assert_eq!(bases(&[&two[..], &[of(1, "")]].concat()), [1; 4]);
 }
+
+/// Two sizes of a series may give one mesh.
+#[test]
+fn a_serial_run_is_its_own_base_beside_one_of_another_series() {
+    let of = |cells: f64, time_s: f64| {
+        let mut run = run(Comm::Solo, 9, &[("a", &[time_s])]);
+        run.setup.series_cells = Some(cells);
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(4e5, 1.0), of(4.02e5, 0.8)]);
+    assert_eq!(groups.all.len(), 2);
+    assert!(groups.all.iter().all(|group| groups.speedup(group).value == 1.0));
+}
