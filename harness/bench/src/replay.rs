@@ -173,11 +173,8 @@ impl Row {
             (Found::Ratio { low, high, how, .. }, Some(Found::Ratio { value, how: here, .. }))
                 if how == here =>
             {
-                if (low..=high).contains(&value) {
-                    Verdict::Inside
-                } else {
-                    Verdict::Outside
-                }
+                let is_inside = (low..=high).contains(&value);
+                if is_inside { Verdict::Inside } else { Verdict::Outside }
             }
             _ => Verdict::NotCompared,
         }

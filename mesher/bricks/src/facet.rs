@@ -102,7 +102,7 @@ struct Side {
 }
 
 impl FacetTest {
-    /// The test of facet `f`, which is prepared unless the last one was of the same facet; part by part, as a whole passes through memory twice.
+    /// The test of facet `f`, prepared unless the last one was of the same facet. In place: a new value would be copied here.
     #[inline(never)]
     fn prepared(&mut self, f: &Facet) -> &Self {
         // Vertex by vertex, because the compiler calls a function for the comparison of all.

@@ -63,7 +63,8 @@ impl BlockStarts {
         }
         let (first, offsets) = self.groups.last_mut().expect("a group has begun");
         // A block has at most 8 nodes and 512 words, and no more components; the end of a chunk is one block more.
-        offsets[self.len % GROUP] = std::array::from_fn(|k| (block[k] - first[k]) as u16);
+        let offset = |k| u16::try_from(block[k] - first[k]).expect("fewer than 2^16 in a group");
+        offsets[self.len % GROUP] = std::array::from_fn(offset);
         self.len += 1;
     }
 
@@ -74,7 +75,7 @@ impl BlockStarts {
     }
 }
 
-/// The start of the block below a node and of the one after it, which follow on one another; and the number of the next.
+/// The start of the block below a node, that of the next block, and the number of the block after that.
 #[derive(Clone, Copy, Default)]
 struct Parent {
     block: [BlockStart; 2],
@@ -344,8 +345,7 @@ impl Nodes {
 
     /// Bytes that the nodes and their components take.
     pub fn bytes(&self) -> usize {
-        let of_level =
-            |l: &LevelNodes| size_of_val(&l.split[..]) + size_of_val(&l.blocks.groups[..]);
+        let of_level = |l: &LevelNodes| size_of_val(&*l.split) + size_of_val(&*l.blocks.groups);
         self.levels.iter().map(of_level).sum::<usize>() + self.masks.bytes()
     }
 

@@ -93,7 +93,7 @@ impl Runner<'_> {
             setup: setup.clone(),
         };
         let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
-        // As of milliseconds for seconds. Ranks within one process run in turn, and their wall time is of one. Each may have threads, and a limit of cores be a fraction.
+        // As of milliseconds for seconds. Ranks within one process run in turn, and the wall time that they report is that of one. Each may have threads, and a limit of cores be a fraction.
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
         let wall_s = if setup.comm == Comm::Sim { run.time_launch_s } else { run.time_wall_s };
         let most_s = (1 + machine::cores()) as f64 * (wall_s + CLOCKS_S);

@@ -43,11 +43,8 @@ impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self> {
         engine.require()?;
         let program = digest_of(engine.files());
-        Ok(Self {
-            engine,
-            measured: Measured { named, revision, program },
-            counted: RefCell::default(),
-        })
+        let measured = Measured { named, revision, program };
+        Ok(Self { engine, measured, counted: RefCell::default() })
     }
 
     /// The candidate that the options name. By default it is a program given for the engine; else the working tree, built in the same way, if
