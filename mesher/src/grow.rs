@@ -78,7 +78,8 @@ pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Resul
     let is_whole = check::is_whole(options, &tree.split, comm);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let is_closed = job.phase("leaks", |comm| openness::is_closed(slice, comm));
+    let [is_closed, is_doubled] =
+        job.phase("leaks", |comm| openness::closed_and_doubled(slice, comm));
     let decided = job.phase("sides", |_| sides::decide(&base, options, is_closed))?;
     job.check(|_| {
         check::sides::components(&decided, &base);
@@ -92,10 +93,8 @@ pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Resul
         let wants_all = options.strict || options.ungraded || sides.summary.inside == 0;
         let leaks = leaks::find(&base, regions, !wants_all);
         let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
-            && match is_closed {
-                true => openness::is_doubled(slice, comm),
-                false => !openness::is_sheet(slice, comm),
-            };
+            && counts.total > 0
+            && (is_doubled || !is_closed && !openness::is_sheet(slice, comm));
         (leaks, bounds_nothing)
     });
     drop(facets);

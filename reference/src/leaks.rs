@@ -6,6 +6,7 @@ use crate::sides::{self, Component, leaf_at};
 use crate::tree::{Index, Tree};
 use serde::Serialize;
 use std::collections::HashSet;
+use std::hash::Hash;
 
 /// A region that has leaked, in the user's unit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,18 +31,30 @@ pub fn find(tree: &Tree, input: &Input) -> Vec<Leak> {
     (1..=input.level_surface.min(2)).flat_map(|k| between(tree, input, k)).collect()
 }
 
-/// Whether every edge belongs to an even number of facets.
+/// Whether every edge belongs to an even number of facets. Each facet counts once where all appear an even number of times.
 fn is_closed(facets: &[Facet]) -> bool {
-    let mut odd = HashSet::new();
-    for [a, b, c] in facets {
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            let edge = [from.min(to), from.max(to)];
-            if from != to && !odd.remove(&edge) {
-                odd.insert(edge);
-            }
-        }
+    let (mut once, mut odd, mut odd_edges) = (HashSet::new(), HashSet::new(), HashSet::new());
+    let sorted = facets.iter().copied().map(|mut facet| {
+        facet.sort_unstable();
+        facet
+    });
+    let facets: Vec<Facet> = sorted.filter(|[a, b, c]| a != b && b != c).collect();
+    for &facet in &facets {
+        once.insert(facet);
+        toggle(&mut odd, facet);
     }
-    odd.is_empty()
+    let counted = if odd.is_empty() { once.into_iter().collect() } else { facets };
+    for edge in counted.into_iter().flat_map(|[a, b, c]| [[a, b], [b, c], [a, c]]) {
+        toggle(&mut odd_edges, edge);
+    }
+    odd_edges.is_empty()
+}
+
+/// Inserts what is not in the set, and removes what is.
+fn toggle<T: Eq + Hash>(set: &mut HashSet<T>, value: T) {
+    if !set.remove(&value) {
+        set.insert(value);
+    }
 }
 
 /// The leaks between T0/k and T0.

@@ -2,7 +2,8 @@
 //!
 //! An edge that belongs to an odd number of facets is on the boundary of the surface. The exclusive or of a hash of every edge of every facet
 //! is 0 if there is none, and otherwise only by a chance of 2^-64. All rays from a point off a closed surface have the same parity, and all points of
-//! a component have that parity: so a closed surface does not leak.
+//! a component have that parity: so a closed surface does not leak. Where every facet appears an even number of times, so does every edge,
+//! whatever the openings: each facet counts once, then.
 //!
 //! A surface that closes the openings of consistently oriented facets has at least the area of the sum of their normals. If that is a
 //! large part of their own area, an opening is no tear: the facets are a sheet. Facets that are turned may have such a sum without any
@@ -23,21 +24,32 @@ const EDGES_MAX: u64 = (1 << 23) / 3;
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
 
-/// Exclusive or of the hashes of all edges.
-fn boundary(facets: &[Facet]) -> u128 {
-    let mut all = 0;
-    for f in facets {
-        let [a, b, c] = f.v.map(|v| v.iter().fold(0, |sum, &c| chained(sum, c)));
-        // An edge without length is none.
-        let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to);
-        all = edges.fold(all, |all, (from, to)| all ^ mix(from.wrapping_add(to)));
+/// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface, and whether each appears an even number of times.
+/// Collective.
+pub fn closed_and_doubled(mine: &[Facet], comm: &dyn Comm) -> [bool; 2] {
+    let xor = |[facets, edges]: [u128; 2], of: [u128; 2]| [facets ^ of[0], edges ^ of[1]];
+    let hashes = mine.iter().filter_map(hashes);
+    let [facets, edges] = over_ranks(hashes.clone().fold([0; 2], xor), xor, comm);
+    if [facets, edges] != [0; 2] {
+        return [edges == 0, false];
     }
-    all
+    // Each facet counts once. All ranks send it to the same rank.
+    let entry =
+        |of: [u128; 2]| ((of[0] % comm.size() as u128) as usize, bytemuck::cast::<_, [u64; 4]>(of));
+    let out = MessageBuffer::of_entries(hashes.map(entry).collect());
+    let mut once: Vec<[u64; 4]> = uncounted(comm, || comm.sparse_all_to_all(out)).values();
+    once.sort_unstable();
+    once.dedup();
+    let edges = once.into_iter().map(bytemuck::cast).fold([0; 2], xor);
+    [over_ranks(edges, xor, comm)[1] == 0, true]
 }
 
-/// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface. Collective.
-pub fn is_closed(mine: &[Facet], comm: &dyn Comm) -> bool {
-    over_ranks(boundary(mine), |all, of| all ^ of, comm) == 0
+/// A hash of a facet, and the exclusive or of those of its edges; none of one with two equal vertices, whose edges cancel.
+fn hashes(f: &Facet) -> Option<[u128; 2]> {
+    let [a, b, c] = f.v.map(|v| v.iter().fold(0, |sum, &c| chained(sum, c)));
+    let edge = |from: u64, to| mix(from.wrapping_add(to));
+    let facet = || [mix(a.wrapping_add(b).wrapping_add(c)), edge(a, b) ^ edge(b, c) ^ edge(c, a)];
+    (a != b && b != c && c != a).then(facet)
 }
 
 /// The value that `merge` makes of those of all ranks. Collective.
@@ -116,20 +128,6 @@ fn length(v: [i128; 3]) -> f64 {
     v.iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Whether every facet of all ranks, of which `mine` are this rank's, appears an even number of times, so that no ray finds an inside.
-/// Collective.
-pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
-    let hash = |f: &Facet| {
-        let mut v = f.v;
-        v.sort_unstable();
-        v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
-    };
-    let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
-    let add = |[count, xor]: [u64; 2], [n, of]: [u64; 2]| [count + n, xor ^ of];
-    let [count, xor] = over_ranks(words, add, comm);
-    count > 0 && xor == 0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,10 +152,12 @@ mod tests {
         [0, 1, 2].into_iter().flat_map(face).collect()
     }
 
-    /// Whether some faces are closed, and whether they are a sheet; the same on any number of ranks.
-    fn kind(faces: &[[Facet; 2]]) -> (bool, bool) {
+    /// Whether some faces are closed and doubled, and whether they are a sheet; the same on any number of ranks.
+    fn kind(faces: &[[Facet; 2]]) -> ([bool; 2], bool) {
         let facets = faces.as_flattened();
-        let of = |mine: &[Facet], comm: &dyn Comm| (is_closed(mine, comm), is_sheet(mine, comm));
+        let of = |mine: &[Facet], comm: &dyn Comm| {
+            (closed_and_doubled(mine, comm), is_sheet(mine, comm))
+        };
         let alone = of(facets, &Solo);
         let slice = |rank: usize| &facets[facets.len() * rank / 3..facets.len() * (rank + 1) / 3];
         let among = sim::run(3, 1, |comm| of(slice(comm.rank()), comm));
@@ -167,9 +167,9 @@ mod tests {
 
     #[test]
     fn closed_surfaces_sheets_and_open_bodies_are_distinguished() {
-        const CLOSED: (bool, bool) = (true, false);
-        const SHEET: (bool, bool) = (false, true);
-        const OPEN: (bool, bool) = (false, false);
+        const CLOSED: ([bool; 2], bool) = ([true, false], false);
+        const SHEET: ([bool; 2], bool) = ([false; 2], true);
+        const OPEN: ([bool; 2], bool) = ([false; 2], false);
         let cube = cube();
         assert_eq!(kind(&cube), CLOSED);
         let mut many = cube.repeat(31);
@@ -194,8 +194,13 @@ mod tests {
         torn[2].iter_mut().for_each(|f| f.v.swap(0, 1));
         assert_eq!(kind(&torn), OPEN, "a side is turned, and the tear is small");
         let twice = [&cube[..], &turned].concat();
-        let facets: Vec<Facet> = twice.concat();
-        assert!(is_doubled(&facets, &Solo) && !is_doubled(&facets[1..], &Solo));
-        assert!(!is_doubled(&cube.concat(), &Solo));
+        let point = Facet { v: [[0; 3]; 3] };
+        assert_eq!(kind(&[&twice[..], &[[point; 2]]].concat()), ([true; 2], false));
+        assert_eq!(
+            kind(&[&cube[1..], &turned[1..]].concat()),
+            ([false, true], false),
+            "without a lid"
+        );
+        assert_eq!(kind(&[&twice[..], &cube].concat()), CLOSED, "three times");
     }
 }

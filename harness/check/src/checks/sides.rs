@@ -13,7 +13,7 @@ use super::contact;
 use super::region::Survey;
 use super::truth::Truth;
 use super::{Check, CheckResult, Subject, some_leaves};
-use crate::oracle::is_watertight;
+use crate::oracle::is_closed;
 use contract::case::Case;
 use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};
 use contract::octant::LEVEL_MAX;
@@ -98,7 +98,7 @@ fn ambiguous(claimed: Ambiguous, truth: &Truth, terms: &Manifest) -> Ambiguous {
 fn leaks(subject: &Subject, truth: &Truth) -> Vec<Leak> {
     let case = subject.case.expect("T0 is that of a case");
     let terms = &subject.inputs;
-    if !terms.seeds.is_empty() && is_watertight(&case.facets_lattice) {
+    if !terms.seeds.is_empty() && is_closed(&case.facets_lattice) {
         return Vec::new();
     }
     let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));

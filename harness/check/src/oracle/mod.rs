@@ -64,12 +64,26 @@ pub fn is_watertight(facets: &[FacetLattice]) -> bool {
     edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
 }
 
+/// Whether no edge is on an opening. Where all facets appear an even number of times, each counts once.
+pub fn is_closed(facets: &[FacetLattice]) -> bool {
+    let mut all = in_order(facets);
+    if all.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0) {
+        all.dedup();
+    }
+    is_watertight(&all)
+}
+
 /// Whether two facets have the same vertices. Rays cancel them; the oracles may count both.
 pub fn is_doubled(facets: &[FacetLattice]) -> bool {
+    in_order(facets).windows(2).any(|pair| pair[0] == pair[1])
+}
+
+/// The facets with three different vertices, in the order of these.
+fn in_order(facets: &[FacetLattice]) -> Vec<FacetLattice> {
     let mut all: Vec<FacetLattice> = facets.iter().copied().map(sorted).collect();
     all.retain(|[a, b, c]| a != b && b != c);
     all.sort_unstable();
-    all.windows(2).any(|pair| pair[0] == pair[1])
+    all
 }
 
 #[cfg(test)]
@@ -181,6 +195,12 @@ mod bodies {
         assert!(!is_watertight(&body) && is_doubled(&body));
         body.push(body[0]);
         assert!(is_watertight(&body));
+        let [whole, torn] = [tetrahedron(), tetrahedron()[1..].to_vec()];
+        for (facets, expected) in [(&whole, true), (&torn, false)] {
+            let twice = [&facets[..], facets].concat();
+            assert_eq!((is_closed(facets), is_closed(&twice)), (expected, expected));
+            assert!(is_watertight(&twice) && is_closed(&[&twice[..], &whole].concat()));
+        }
     }
 
     #[test]
