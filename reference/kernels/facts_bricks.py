@@ -1,7 +1,7 @@
 """Facts about octants, bricks and dilation."""
 import z3
 from kernels import AXES, BIT_AT, BRICK, OCTANT, OCTANTS, ROOT, TILE, any_bit, bit, code_of, fact, no, octant, u32, union, usize, wide, word
-from rust import Number, plain, Run, term
+from rust import Number, plain, Range, Run, term
 
 
 # Octants
@@ -230,19 +230,51 @@ def bricks_of_rows(k):
         yield k("from_rows", out[i]).x == word(bit(m[y + 4 * z], 4 * i + x) for x, y, z in OCTANTS)
 
 
+@fact(TILE, ("bits.trailing_zeros() as usize", "bits.trailing_zeros() as usize + 1"), ("(u32::BITS - bits.leading_zeros())", "(u32::BITS - 1 - bits.leading_zeros())"))
+def span(k):
+    """`span` starts at the first set bit and ends after the last, for all masks but 0."""
+    w = k.bits("u32")
+    k.given.append(w.x != 0)
+    of = k("span", w)
+    first, last = z3.Extract(31, 0, of.start.x), z3.Extract(31, 0, of.end.x) - 1
+    yield z3.And(z3.ULE(first, last), z3.ULT(last, 32), z3.LShR(w.x, first) & 1 == 1, z3.LShR(w.x, last) == 1, (w.x & (z3.BitVecVal(1, 32) << first) - 1) == 0)
+
+
+def dilations(k, w, at, r, spans):
+    """By path, that a tile has exactly the octants within r of one of the brick `w`, which is the only one, if `spans` are those of its rows."""
+    margin, side = 8, 48
+    low = [16 + 4 * at[0], margin + 4 * at[1], margin + 4 * at[2]]
+    def reached(z, y):
+        near = [i for i, p in enumerate(OCTANTS) if max(abs(low[1] + p[1] - y), abs(low[2] + p[2] - z)) <= r]
+        return word(any_bit(bit(w, i) for i in near if abs(low[0] + OCTANTS[i][0] - x) <= r) for x in range(64)) if near else z3.BitVecVal(0, 64)
+    want = [reached(z, y) for z in range(side) for y in range(side)]
+    replaced = {"span": lambda run, bits: spans(run, bits, 4 * at[1]),
+                "ones": lambda run, bits: [u32(i) for i in range(64) if plain(bits) >> i & 1],
+                "to_rows": lambda run, w: Number("u64", word(bit(w, BIT_AT[i & 3, i >> 2 & 3, i >> 4]) for i in range(64)))}
+    key = sum((c >> b & 1) << 3 * b + a for a, c in enumerate(at) for b in range(3))
+    for path, tile in k.tiles(w, key, r, margin, side, [Number("u64", 0)] * side ** 2, replaced):
+        yield z3.Implies(path, z3.And([term(row, Number("u64", x)) == x for row, x in zip(tile["rows"], want)]))
+
+
 @fact(TILE, ("for s in (0..=2 * r).filter(|s| *s != r)", "for s in (1..=2 * r).filter(|s| *s != r)"), ("for to in z - r..=z + r {", "for to in z - r..=z {"),
       ("*row |= (four >> (4 * dy) & 15) << shift;", "*row |= (four >> (4 * dy) & 7) << shift;"), ("out.copy_from_slice(rows);", ""))
 def bricks_dilated(k):
     """`put` and `dilate_lanes`: the tile then has exactly the octants within r of one of the brick, along all three axes, for all 2^64 bricks
-    at two places of a tile, one with r = 1 and one with r = 2."""
-    def ones(run, bits): return [u32(i) for i in range(64) if plain(bits) >> i & 1]
+    at two places of a tile, one with r = 1 and one with r = 2, if all four rows of its layers are dilated."""
     for at, r in (((0, 7, 7), 1), ((7, 0, 3), 2)):
-        margin, side = 8, 48
-        w = k.bits("u64")
-        low = [16 + 4 * at[0], margin + 4 * at[1], margin + 4 * at[2]]
-        def reached(z, y):
-            near = [i for i, p in enumerate(OCTANTS) if max(abs(low[1] + p[1] - y), abs(low[2] + p[2] - z)) <= r]
-            return word(any_bit(bit(w, i) for i in near if abs(low[0] + OCTANTS[i][0] - x) <= r) for x in range(64)) if near else z3.BitVecVal(0, 64)
-        want = [reached(z, y) for z in range(side) for y in range(side)]
-        for path, tile in k.tiles(w, sum((c >> b & 1) << 3 * b + a for a, c in enumerate(at) for b in range(3)), r, margin, side, [Number("u64", 0)] * side ** 2, ones):
-            yield z3.Implies(path, z3.And([term(row, Number("u64", x)) == x for row, x in zip(tile["rows"], want)]))
+        yield from dilations(k, k.bits("u64"), at, r, lambda run, bits, y: Range(usize(y), usize(y + 4), []))
+
+
+@fact(TILE, ("& 0xffff) * 0x1248)", "& 0xffff) * 0x1240)"), ("let pairs = rows | rows >> 1;", "let pairs = rows | rows >> 2;"),
+      ("self.columns_at[z + dz] |= columns << y;", "self.columns_at[z + dz] |= columns << (y + 1);"), ("m + start - r..m + end + r)", "m + start - r..m + end)"))
+def layers_dilated(k):
+    """The same for all 2^16 sources in each layer of a brick alone, whose rows are dilated only from the first source to the last."""
+    def first_and_last(run, bits, y):
+        has = lambda i: run.truth(z3.Extract(i, i, bits.x) == 1)
+        first = next((i for i in range(y, y + 3) if has(i)), y + 3)
+        return Range(usize(first), usize(next((i for i in range(y + 3, first, -1) if has(i)), first) + 1), [])
+    for at, r, layers in (((0, 7, 7), 1, (0, 2)), ((7, 0, 3), 2, (1, 3))):
+        for z in layers:
+            w = k.bits("u64")
+            of_layer = Number("u64", word(bit(w, i) if p[2] == z else no(i) for i, p in enumerate(OCTANTS)))
+            yield from dilations(k, of_layer, at, r, first_and_last)

@@ -78,11 +78,11 @@ class Kernels:
                 return paths
             choices[-1] = False
 
-    def tiles(self, w, key, r, margin, side, zeros, ones):
+    def tiles(self, w, key, r, margin, side, zeros, replaced):
         """The tiles, by path, in which a brick was put and dilated."""
         choices = []
         while True:
-            run = Run(self.sources, {"ones": ones}, choices)
+            run = Run(self.sources, replaced, choices)
             tile = Struct(radius=usize(r), margin=usize(margin), side=usize(side), rows=list(zeros), spread=list(zeros), layers=u32(0), columns=u32(0), columns_at=[u32(0)] * 32)
             run.call("put", [tile, Struct(key=Number("u64", key), bits=w)], TILE)
             if plain(tile["layers"]):

@@ -586,13 +586,17 @@ class Run:
         bits, n = WIDTHS[a.type], plain(n)
         return Number(a.type, wrapped(a.type, a.x << n | a.x >> bits - n) if a.is_known else z3.RotateLeft(a.x, n))
 
-    def number_trailing_zeros(self, a): return Number("u32", (a.x & -a.x).bit_length() - 1 if a.x else WIDTHS[a.type])
+    def number_trailing_zeros(self, a):
+        bits = WIDTHS[a.type]
+        return Number("u32", (a.x & -a.x).bit_length() - 1 if a.x else bits) if a.is_known else self.zeros_before(a, range(bits))
 
     def number_leading_zeros(self, a):
         bits = WIDTHS[a.type]
-        if a.is_known:
-            return Number("u32", bits - (a.x % (1 << bits)).bit_length())
-        value = z3.BitVecVal(bits, 32)
-        for i in range(bits):
-            value = z3.If(z3.Extract(i, i, a.x) == 1, z3.BitVecVal(bits - 1 - i, 32), value)
+        return Number("u32", bits - (a.x % (1 << bits)).bit_length()) if a.is_known else self.zeros_before(a, reversed(range(bits)))
+
+    def zeros_before(self, a, order):
+        """The number of bits before the first that is set, in an order of all bits of a term."""
+        value = z3.BitVecVal(WIDTHS[a.type], 32)
+        for n, i in reversed(list(enumerate(order))):
+            value = z3.If(z3.Extract(i, i, a.x) == 1, z3.BitVecVal(n, 32), value)
         return Number("u32", value)

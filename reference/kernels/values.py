@@ -78,12 +78,18 @@ def ray(r):
     return [f, p, usize(axis)]
 
 
+def test_of_origin():
+    """`FacetTest::default`."""
+    side = Struct(ci=Number("i32", 0), cj=Number("i32", 0), at_origin=i64(0), growth=Number("i32", 0))
+    return Struct(facet=Struct(v=[[Number("i32", 0)] * 3 for _ in range(3)]), normal=[i64(0)] * 3, sides=[[side] * 3 for _ in range(3)])
+
+
 def separated(run, f, corner, shift):
     """The tests by lanes, at the width that every processor has."""
-    return run.call("lanes", [f if "facet" in f else run.call("new", [f], FACET), corner, shift], FACET)
+    return run.call("lanes", [f if "facet" in f else run.call("prepared", [test_of_origin(), f], FACET), corner, shift], FACET)
 
 
-REPLACED = {"separated": separated, "default": lambda run: Struct(), "prepared": lambda run, _, f: run.call("new", [f], FACET)}
+REPLACED = {"separated": separated, "default": lambda run: test_of_origin()}
 
 INPUTS = {
     (OCTANT, "spread"): lambda r: [u64(r)],
