@@ -107,23 +107,6 @@ impl From<io::Error> for Failure {
     }
 }
 
-/// A user who watches a long computation.
-pub trait Watch: Sync {
-    /// A step begins.
-    fn step(&self, _what: &str) {}
-
-    /// Whether the user has interrupted it.
-    fn is_interrupted(&self) -> bool;
-
-    /// Whether to continue.
-    ///
-    /// # Errors
-    /// If the user has interrupted it.
-    fn check(&self) -> Result<(), Failure> {
-        if self.is_interrupted() { Err(Failure::interrupted()) } else { Ok(()) }
-    }
-}
-
 /// Whether the user has interrupted the program.
 pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -131,21 +114,19 @@ pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 pub struct Progress;
 
 impl Progress {
-    /// Removes the line.
-    pub fn finish(&self) {
-        self.step("");
-    }
-}
-
-impl Watch for Progress {
-    fn step(&self, what: &str) {
+    /// A step begins. One without a name removes the line.
+    pub fn step(&self, what: &str) {
         if stderr().is_terminal() {
             let _ = write!(stderr().lock(), "\r\x1b[K{what}");
         }
     }
 
-    fn is_interrupted(&self) -> bool {
-        INTERRUPTED.load(Ordering::SeqCst)
+    /// Whether to continue.
+    ///
+    /// # Errors
+    /// If the user has interrupted the program.
+    pub fn check(&self) -> Result<(), Failure> {
+        if INTERRUPTED.load(Ordering::SeqCst) { Err(Failure::interrupted()) } else { Ok(()) }
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::{Failure, Progress, Result, Watch};
+use crate::failure::{Failure, Progress, Result};
 use crate::htg::{Block, TreeError, TreeFile};
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;

@@ -7,7 +7,7 @@
 use std::io::BufWriter;
 use std::path::Path;
 
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use contract::files;
 use contract::lattice::Root;
 use contract::tree::{Builder, Handle, Kind, Tree};

@@ -12,7 +12,7 @@
 
 use crate::options::Export;
 use crate::points::Point;
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word;

@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         script,
     };
     let written = (format.write)(&export, file);
-    Progress.finish();
+    Progress.step("");
     let Summary { leaves, bytes, notes } = written?;
     let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
     let per_cell = bytes as f64 / leaves as f64;

@@ -4,7 +4,7 @@ use crate::options::{Input, Output, examples, point, whole_seconds};
 use crate::output::put_forms;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Progress, Result, Watch};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Progress, Result};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::PlainCase;
@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         Some(words) if level == case.level_surface => Ok(words),
         _ => Ok(tree(level)?.words),
     };
-    let mut leaks = Leaks::new(&case, make, &Progress)?;
+    let mut leaks = Leaks::new(&case, make)?;
     let ends = match (arguments.from, arguments.to) {
         (Some(from), to) => vec![(from, to.unwrap_or(Target::Far))],
         (None, Some(to)) => {
@@ -89,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         }
     };
     let answers = leaks.answers(&ends)?;
-    Progress.finish();
+    Progress.step("");
     Progress.check()?;
     if ends.is_empty() {
         println!(

@@ -11,7 +11,7 @@ use contract::word;
 
 use super::Mesh;
 use crate::points::to_user;
-use contract::failure::{Progress, Result, Watch};
+use contract::failure::{Progress, Result};
 
 impl Mesh {
     /// Writes the files into a directory, with labels of 64 bits if they are wide, and else of 32.

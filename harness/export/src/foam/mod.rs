@@ -20,7 +20,7 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use contract::files::{Staging, nearest_directory};
 use contract::number::numbered;
 use contract::sets::Sets;

@@ -19,7 +19,7 @@ mod tests;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use contract::files::fill_atomically;
 use contract::lattice::Root;
 use contract::number::number;

@@ -17,7 +17,7 @@ use contract::lattice::Root;
 use contract::manifest::Sides;
 
 use crate::options::{Export, Summary};
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use piece::{Encoder, Piece};
 
 /// Maximum number of leaves in a piece.

@@ -116,18 +116,9 @@ mod tests {
     use super::super::report::Spacing;
     use super::*;
     use contract::failure::Failure;
-    use contract::failure::Watch;
     use contract::testing::base_tree;
     use geometries::{Generator, Shape};
     use std::panic::{AssertUnwindSafe, catch_unwind};
-
-    struct Silent;
-
-    impl Watch for Silent {
-        fn is_interrupted(&self) -> bool {
-            false
-        }
-    }
 
     /// A sphere without one of its facets, the path out of its centre, and the base tree that this leads through.
     fn torn() -> (Case, Passage, Vec<u64>) {
@@ -136,7 +127,7 @@ mod tests {
         let text = "spacing_min = 0.015625\n[root]\norigin = [-0.99, -1.03, -1.01]\nedge = 2.0";
         let case = Case::from_parts(text, facets).unwrap();
         let tree = |level| Ok::<_, Failure>(base_tree(&case.facets_lattice, |_| level));
-        let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+        let mut leaks = Leaks::new(&case, tree).unwrap();
         let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
         let passage = report.passage.unwrap();
         let words = leaks.trees[&passage.spacing.level].clone();

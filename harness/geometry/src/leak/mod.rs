@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::{Failure, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Leak;
 use contract::word::{self, Side};
@@ -57,7 +57,6 @@ pub struct Leaks<'a, F> {
     make: F,
     /// Those that were made.
     trees: BTreeMap<u8, Vec<u64>>,
-    watch: &'a dyn Watch,
 }
 
 impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
@@ -65,17 +64,17 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If the case has no facets.
-    pub fn new(case: &'a Case, make: F, watch: &'a dyn Watch) -> Result<Self> {
+    pub fn new(case: &'a Case, make: F) -> Result<Self> {
         let why = "the case has no facets, so nothing separates places";
         Failure::unless(!case.facets.is_empty(), why)?;
         let facets = FacetTree::new(&case.facets_lattice);
-        Ok(Self { case, facets, make, trees: BTreeMap::new(), watch })
+        Ok(Self { case, facets, make, trees: BTreeMap::new() })
     }
 
     /// Answers for pairs of places, with their invariants checked.
     ///
     /// # Errors
-    /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if `watch` is interrupted.
+    /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if the user interrupts.
     pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers> {
         let examined =
             ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
@@ -105,11 +104,11 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             report.closes = self.coarsen(ends, outside, finest)?;
             for measured in level.min(finest + 2)..=level {
                 self.make_tree(measured)?;
-                self.watch.step("measuring the width");
+                Progress.step("measuring the width");
                 let outside = outside.map(|level| &self.trees[&level][..]);
                 let words = &self.trees[&measured];
                 let space = Space::new(words, &self.facets, outside)?;
-                let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
+                let passage = passage::widest((self.case, measured), space, ends)?;
                 // Otherwise, a narrow place at the start, which no opening is, may hide a wider path.
                 if measured == level || passage.is_widest() {
                     passage.check_invariants(self.case, (words, outside), (from, to));
@@ -134,7 +133,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
 
     fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
-            self.watch.step(&format!("meshing the base tree of level {level}"));
+            Progress.step(&format!("meshing the base tree of level {level}"));
             self.trees.insert(level, (self.make)(level)?);
         }
         Ok(())
@@ -164,11 +163,11 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     /// The level of the finest leaves on the path that joins the ends through the coarsest free leaves of a base tree; none if no path does.
     /// The ends lie in free leaves. The far field is what is `outside` at that level, if there is one.
     fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<Option<u8>> {
-        self.watch.step(&format!("searching the base tree of level {level}"));
+        Progress.step(&format!("searching the base tree of level {level}"));
         let outside = outside.map(|level| &self.trees[&level][..]);
         let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
-        let widest = space.widest(ends, f32::INFINITY, edge, self.watch)?;
+        let widest = space.widest(ends, f32::INFINITY, edge)?;
         Ok(widest.map(|(_, edge)| (UNITS_PER_EDGE as f32 / edge).log2() as u8))
     }
 

@@ -17,7 +17,7 @@ use super::space::{Cell, Space};
 use super::{Ends, to_user};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::{Result, Watch};
+use contract::failure::Result;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::ExtentBox;
 use parry3d_f64::bounding_volume::Aabb;
@@ -95,23 +95,16 @@ fn passing(from: &Place, to: &Place) -> f64 {
 struct Search<'a> {
     space: Space<'a>,
     ends: Ends,
-    watch: &'a dyn Watch,
 }
 
 /// The widest path between two points, or to the far field, which free leaves of the base tree of this level join: the cells of `space`.
 ///
 /// # Errors
-/// If `watch` is interrupted.
-pub fn widest(
-    (case, level): (&Case, u8),
-    space: Space,
-    (from, to): Ends,
-    watch: &dyn Watch,
-) -> Result<Passage> {
+/// If the user interrupts.
+pub fn widest((case, level): (&Case, u8), space: Space, (from, to): Ends) -> Result<Passage> {
     let (facets, before) = (space.facets, approach(&space, from));
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
-    let mut search =
-        Search { space, ends: (before[before.len() - 1], after.last().copied()), watch };
+    let mut search = Search { space, ends: (before[before.len() - 1], after.last().copied()) };
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
         let Place { at, clearance, .. } = way.points[way.narrowest()];
@@ -166,7 +159,7 @@ impl Search<'_> {
     fn converge(&mut self) -> Result<Way> {
         let (mut cap, mut searches, mut bound) = (f32::INFINITY, 0, None);
         loop {
-            let found = self.space.widest(self.ends, cap, Space::radius, self.watch)?;
+            let found = self.space.widest(self.ends, cap, Space::radius)?;
             let (cells, width) = found.expect("free leaves join the ends");
             if width < cap {
                 // The shortest of the paths that are as wide is searched next.

@@ -9,7 +9,7 @@ use std::iter::successors;
 
 use super::{Ends, leaf_at};
 use crate::tree::{FacetTree, Point};
-use contract::failure::{Result, Watch};
+use contract::failure::{Progress, Result};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, KEY_END, Order, Side};
@@ -197,13 +197,12 @@ impl<'a> Space<'a> {
     /// throughout, it is a short one that keeps away from facets. `None` if no path exists.
     ///
     /// # Errors
-    /// If `watch` is interrupted.
+    /// If the user interrupts.
     pub fn widest(
         &mut self,
         (from, to): Ends,
         cap: f32,
         width: fn(&mut Self, u32) -> f64,
-        watch: &dyn Watch,
     ) -> Result<Option<(Vec<u32>, f32)>> {
         let (start, end) = (self.locate(from), to.map(|to| self.locate(to)));
         let mut via = vec![start; self.cells.len()];
@@ -226,7 +225,7 @@ impl<'a> Space<'a> {
                 path.reverse();
                 return Ok(Some((path, label.0)));
             }
-            watch.check()?;
+            Progress.check()?;
             joined.clear();
             self.neighbours(cell, &mut joined);
             for &next in &joined {

@@ -3,7 +3,7 @@
 mod openings;
 
 use contract::case::{Case, Facet};
-use contract::failure::{Failure, Result, Watch};
+use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::octant::Octant;
 use contract::testing::{assert_text, base_tree};
@@ -18,14 +18,6 @@ use proptest::prelude::*;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
 const ROOT: Root = Root { origin: [-3.91, -4.13, -4.07], edge: 8.0 };
-
-struct Silent;
-
-impl Watch for Silent {
-    fn is_interrupted(&self) -> bool {
-        false
-    }
-}
 
 fn case_in(root: Root, facets: &[Facet], level: u8) -> Case {
     let spacing = root.edge / f64::from(1u32 << level);
@@ -43,8 +35,7 @@ fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report> {
 }
 
 fn answers(case: &Case, ends: ([f64; 3], Target)) -> Result<Answers> {
-    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, |_| level)), &Silent)?
-        .answers(&[ends])
+    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, |_| level)))?.answers(&[ends])
 }
 
 fn from_centre(facets: &[Facet], level: u8) -> Report {
@@ -217,7 +208,7 @@ fn in_box(
         let level = |octant: &Octant| if case.boxes[0].meets(octant) { fine } else { level };
         Ok(base_tree(&case.facets_lattice, level))
     };
-    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+    let mut leaks = Leaks::new(&case, tree).unwrap();
     leaks.answers(&[(from, Target::Far)]).unwrap().examined.remove(0)
 }
 
@@ -275,7 +266,7 @@ fn a_coarser_base_tree_that_cannot_be_meshed_is_no_answer() {
         _ => Err(Failure::input(format!("no memory for level {level}"))),
     };
     let ends = [([0.0; 3], Target::Far)];
-    let failure = Leaks::new(&case, tree, &Silent).unwrap().answers(&ends).unwrap_err();
+    let failure = Leaks::new(&case, tree).unwrap().answers(&ends).unwrap_err();
     assert_eq!(failure.why, "no memory for level 7");
 }
 
@@ -290,7 +281,7 @@ fn a_path_starts_at_the_first_seed_that_reaches_its_end() {
     );
     let case = Case::from_parts(&text, facets).unwrap();
     let tree = |level| Ok(base_tree(&case.facets_lattice, |_| level));
-    let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
+    let mut leaks = Leaks::new(&case, tree).unwrap();
     for (end, seed) in
         [(Target::Far, 0.0), (Target::Point([0.0, 0.0, 3.0]), 0.0), (Target::Point([2.6; 3]), 2.5)]
     {

@@ -51,7 +51,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let begun = selected.iter().take_while(|_| !interrupt::requested());
     let cases = begun.map(|case| verification.case(case)).collect::<Result<Vec<_>>>()?;
     let Verification { needs, workplace, .. } = verification;
-    Progress.finish();
+    Progress.step("");
     let interrupted = interrupt::requested();
     workplace.close(cases.iter().any(|case| case.kept.is_some()) && (options.keep || !interrupted));
     let engine = &programs.engine.description;
