@@ -117,8 +117,8 @@ impl Input {
 
     /// Whether a space that rays take for outside is meshed: with the inside, with enclosed space, or from a seed in the body's bounding box.
     pub fn is_space_meshed(&self) -> bool {
-        let is_kept = self.case.enclosed == Enclosed::Keep;
-        self.is_meshed(true) || self.are_seeds_beyond.map_or(is_kept, |are_beyond| !are_beyond)
+        let by_rays = || self.is_meshed(true) || self.case.enclosed == Enclosed::Keep;
+        self.are_seeds_beyond.map_or_else(by_rays, |are_beyond| !are_beyond)
     }
 
     /// Whether an overlap of solids can change the region: such a space, crossing leaves in it, or one that may reach the root's boundary.

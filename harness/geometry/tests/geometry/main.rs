@@ -285,6 +285,12 @@ fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
         assert_eq!(found.changes_region, has_effect, "{rules}: {found}");
         assert_eq!(found.to_string().contains("all of them lie beyond the body"), !has_effect);
     }
+    // The ray of a seed beyond a half model counts an odd number of facets where it leaves through the plane of symmetry.
+    let half = |low, high| cuboid(low, high).into_iter().filter(|f| f.iter().any(|v| v[0] > -16.0));
+    let [fuselage, wing] = [([0.0, 0.0], -8.0), ([2.0, 1.0], -4.0)]
+        .map(|([y, z], x)| half([-16.0, y, z], [x, y + 4.0, z + 4.0]).collect::<Vec<_>>());
+    let found = case(&[fuselage, wing].concat(), "seeds = [[12.0, 5.0, 2.0]]");
+    assert!(count(&found, Kind::Intersections) > 0 && !found.changes_region, "{found}");
     // Walls matter to a flow within the body, gaps to one around it, whatever side is kept by its name.
     let plate = cuboid([0.0; 3], [4.0, 4.0, 0.125]);
     let thin = [plate, cuboid([0.0, 0.0, 0.25], [4.0; 3])].concat();
