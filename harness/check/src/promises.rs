@@ -80,6 +80,11 @@ impl Promises {
         Self { definition: true, ..Self::default() }
     }
 
+    /// Whether nothing is promised, as of a mesh that must only equal another one.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// Whether two serial runs must give the same mesh.
     pub fn is_deterministic(&self) -> bool {
         self.definition || self.deterministic
@@ -97,7 +102,7 @@ impl Promises {
 
     /// Why the table is invalid, in one sentence; `None` if it is valid.
     pub fn fault(&self) -> Option<String> {
-        let fault = if *self == Self::default() {
+        let fault = if self.is_empty() {
             "[promises] is empty: state what the meshes guarantee, or `definition = true`"
         } else if self.definition && *self != Self::of_definition() {
             "`definition` includes all other promises: remove it, or remove them"

@@ -76,25 +76,16 @@ impl<'a> Subject<'a> {
         self.pass.tree.as_ref().expect("without a tree, no check of it runs")
     }
 
-    /// A finding if the tree of the mesh exceeds its limit, so that no check of it can run, or T0 that of a mesh in memory. An audit without T0 shows
-    /// what the leaves alone show.
+    /// A finding if the tree of the mesh exceeds its limit, so that no check of it can run. Without T0, checks show what the leaves alone show.
     pub(super) fn capacity(&self) -> Option<CheckResult> {
         let mut result = CheckResult::new(CAPACITY);
         if self.pass.tree.is_none() {
             let why = "and was not checked; increase the limit";
             result.report(format_args!("a tree has more distinct octants than the limit {why}"));
-        } else if self.case.is_some() && self.truth().is_none() {
-            let (most, tally) = (Truth::LEAVES_MAX as u64, &self.pass.tally);
-            let bytes = 40 * most.max(tally.leaves_by_side.crossing);
-            let why = format!(
-                "T0 of the case has more than {most} leaves and needs {:.1} GB or more, so the other checks \
-                 compare the mesh with the inputs of the case, but not with its facets",
-                bytes as f64 / 1e9
-            );
-            match self.mesh {
-                Some(_) => result.report(why),
-                None => result.lacks(why),
-            }
+        } else if self.case.is_some() && !self.promises.is_empty() && self.truth().is_none() {
+            let why = "so the other checks compare the mesh with the inputs of the case, but not with its facets";
+            result
+                .lacks(format!("T0 of the case has more than {} leaves, {why}", Truth::LEAVES_MAX));
         }
         (!result.holds() || !result.was_run()).then_some(result)
     }

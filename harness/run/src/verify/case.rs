@@ -12,7 +12,7 @@ use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
 use contract::catalogue::Selected;
-use contract::failure::{Progress, Watch};
+use contract::failure::Progress;
 use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.
@@ -110,10 +110,11 @@ impl<'a> CaseRun<'a> {
 
     /// Adds the failure of a run, unless it is the user's interrupt.
     pub fn add_failure(&mut self, subject: &str, layout: Option<&Layout>, failure: &Failure) {
+        let may_refuse = self.promises().definition && layout.is_none();
         let why = match &failure.end {
             End::Interrupted => return,
-            // The code may mean anything else for a program that was not written for the harness.
-            End::Exited { code: CODE_INPUT, error } if self.promises().definition => {
+            // The code may mean anything else for a program that was not written for the harness, and on ranks after a serial run.
+            End::Exited { code: CODE_INPUT, error } if may_refuse => {
                 format!("it refuses the case: {error}")
             }
             _ => failure.to_string(),

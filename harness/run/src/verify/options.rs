@@ -19,7 +19,7 @@ use std::time::Duration;
 /// A prerequisite of a verification that a machine may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Need {
-    /// `mpirun`, and a mesher that was built with MPI.
+    /// `mpirun`. A mesher that was built without MPI fails.
     Mpi,
     /// Python with the packages of all three oracles.
     Oracles,
