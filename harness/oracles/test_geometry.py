@@ -29,7 +29,8 @@ REPO = pathlib.Path(__file__).resolve().parents[2]
 def binary():
     """The harness, or None if it is not built or does not have the command."""
     named = os.environ.get("HARNESS")
-    built = [REPO / "target" / profile / "harness" for profile in ("debug", "release")]
+    target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", REPO / "target"))
+    built = [target / profile / "harness" for profile in ("debug", "release")]
     candidates = [pathlib.Path(named)] if named else [path for path in built if path.exists()]
     if not candidates:
         return None

@@ -153,7 +153,7 @@ pub struct Network {
     pub bandwidth_bytes_per_s: f64,
     /// Whether a ping-pong measured them; otherwise the user gave them, or they are [`ASSUMED`].
     pub measured: bool,
-    /// Whether the user gave them. Older records do not say it.
+    /// Whether the user gave them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub given: bool,
 }
@@ -349,7 +349,7 @@ pub struct Run {
     pub command: String,
     /// Digest of the program's files; empty if one cannot be read.
     pub program: String,
-    /// Digest of those of its files that lie in the directory of the engine file, or below; empty without such, and in older records.
+    /// Digest of those of its files that lie in the directory of the engine file, or below; empty without such.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub scripts: String,
     /// Facets of the geometry.
@@ -357,8 +357,7 @@ pub struct Run {
     /// Digest of the facets as the program read them, if it reports one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<String>,
-    /// Digest of the rules and the geometry of the case from which the run's case was derived; empty in older records.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    /// Digest of the rules and the geometry of the case from which the run's case was derived.
     pub inputs: String,
     /// Leaves of the mesh.
     pub cells: u64,

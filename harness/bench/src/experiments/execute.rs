@@ -93,11 +93,15 @@ impl Runner<'_> {
             setup: setup.clone(),
         };
         let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
+        Failure::unless(run.is_possible(), why)?;
         // As of milliseconds for seconds. Ranks within one process run in turn, and the wall time that they report is that of one. Each may have threads, and a limit of cores be a fraction.
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
         let wall_s = if setup.comm == Comm::Sim { run.time_launch_s } else { run.time_wall_s };
         let most_s = (1 + machine::cores()) as f64 * (wall_s + CLOCKS_S);
-        Failure::unless(run.is_possible() && busy_s <= most_s * node_count() as f64, why)?;
+        let why = format!(
+            "its phases have {busy_s} s of CPU time, more than all cores have in {wall_s} s"
+        );
+        Failure::unless(busy_s <= most_s * node_count() as f64, why)?;
         Ok(run)
     }
 }
@@ -293,7 +297,8 @@ mod tests {
             ("[0.01, 5e3]", Comm::Sim, more),
             ("[9.0]", Comm::Solo, brief),
         ] {
-            assert!(with(cpu_s, comm, more).unwrap_err().contains("numbers that no run can have"));
+            let why = "s of CPU time, more than all cores have in";
+            assert!(with(cpu_s, comm, more).unwrap_err().contains(why));
         }
     }
 

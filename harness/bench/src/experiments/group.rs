@@ -390,10 +390,7 @@ fn apart(
     }
     machine += &format!("program {}", run.program);
     setup.engine += &programs.suffix(&run.setup.engine, &machine);
-    // Older runs do not state them.
-    if !run.inputs.is_empty() {
-        setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
-    }
+    setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
     if let Some(digest) = &run.geometry {
         let Setup { spacing_min, layer_cells_min: n, .. } = &setup;
         let mesh = format!("{} at spacing {spacing_min:e}, n {n}", case_of(&setup));

@@ -58,10 +58,13 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             }
         }
         let (verdict, who, why) = match (old, new) {
-            (Some(Ok(old)), Ok(new)) => {
-                layer.findings.extend(judged(bench, case, name, [old, new]));
-                continue;
-            }
+            (Some(Ok(old)), Ok(new)) => match judged(bench, case, name, [old, new]) {
+                Ok(findings) => {
+                    layer.findings.extend(findings);
+                    continue;
+                }
+                Err(why) => (Verdict::Regression, "a repetition has no", why),
+            },
             (None, Ok(new)) => {
                 let compared = new.of_layer(name).len() as u64;
                 let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
@@ -86,7 +89,7 @@ fn judged(
     case: &GateCase,
     layer: LayerName,
     mut pair: [CaseMeasures; 2],
-) -> Vec<GateFinding> {
+) -> Result<Vec<GateFinding>, Failure> {
     let is_accepted = bench.options.accept_meshes;
     let compared = |[old, new]: &[CaseMeasures; 2]| {
         compare(&case.name, layer, [old, new], &bench.rules.tolerance, is_accepted)
@@ -98,14 +101,14 @@ fn judged(
             break;
         }
         for (of, subject) in pair.iter_mut().zip(bench.baseline.iter().chain([&bench.candidate])) {
-            for (metric, bytes) in count(bench, &subject.engine, case).unwrap_or_default().memory {
+            for (metric, bytes) in count(bench, &subject.engine, case)?.memory {
                 let highest = of.memory.entry(metric).or_default();
                 *highest = bytes.max(*highest);
             }
         }
         findings = compared(&pair);
     }
-    findings
+    Ok(findings)
 }
 
 /// Compares two measurements of a case. If both together have numbers beside the cells, they must share one of them.
@@ -215,12 +218,16 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
         let independent = engine.description.promises.is_independent_of(Independence::Ranks);
         // Of a report without a digest, the layer of correctness compares the mesh.
-        if let Some(digest) = &report.digest
-            && measures.digest.get_or_insert(digest.clone()) != digest
-            && independent
-        {
-            let why = format!("on {ranks} has digest {digest}, which differs from the serial one");
-            return Err(engine.unusable(why));
+        if let Some(digest) = &report.digest {
+            let all = measures.digest.get_or_insert(digest.clone());
+            if all != digest {
+                if independent {
+                    let why = "which differs from the serial one";
+                    return Err(engine.unusable(format!("on {ranks} has digest {digest}, {why}")));
+                }
+                // The numbers of all meshes are compared together.
+                *all += &format!(", {digest} on {ranks}");
+            }
         }
         let prefix = prefix(ranks);
         if ranks == Ranks::Serial {

@@ -4,7 +4,7 @@ use super::Study;
 use super::judge::of_last_origin;
 use crate::experiments::cases::Base;
 use crate::experiments::entry::{Line, Run};
-use crate::experiments::machine::{digest_of, digest_of_scripts};
+use crate::experiments::machine::digest_of_scripts;
 use crate::read_toml;
 use contract::failure::{Failure, Result};
 use contract::files::{self, write_atomically};
@@ -74,9 +74,7 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<
         let (case, ..) = study.source(&run.setup).expect("the study asks for it");
         (case, run.inputs.clone())
     };
-    // Older runs do not state their inputs.
-    let runs = last.iter().filter_map(Line::run).filter(|run| !run.inputs.is_empty());
-    for (case, inputs) in runs.map(of_run).collect::<BTreeSet<_>>() {
+    for (case, inputs) in last.iter().filter_map(Line::run).map(of_run).collect::<BTreeSet<_>>() {
         let path = paths.catalogue.case_file(case, &study.directory)?;
         let base = Base::read(&path, None, place.path())?;
         let why = "rules or geometry are not those of the record's runs";
@@ -84,12 +82,8 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<
     }
     for name in study.engines().iter().filter(|name| name.ends_with(".toml")) {
         let Ok(engine) = Engine::find(name, None, paths) else { continue };
-        // Older records have no digest of the scripts alone.
-        let [all, own] = [digest_of(engine.files()), digest_of_scripts(&engine)];
-        let is_other = |run: &Run| {
-            let is_known = !run.scripts.is_empty() || own == all && run.program != all;
-            run.setup.engine == engine.label() && run.scripts != own && is_known
-        };
+        let scripts = digest_of_scripts(&engine);
+        let is_other = |run: &Run| run.setup.engine == engine.label() && run.scripts != scripts;
         let is_other = last.iter().filter_map(Line::run).any(is_other);
         Failure::unless(!is_other, format!("{name}: its program is not that of the record"))?;
     }
@@ -134,6 +128,7 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
 mod tests {
     use super::*;
     use crate::experiments::entry::{Comm, Entry, NoResult, Setup};
+    use crate::experiments::machine::digest_of;
     use crate::testing::{line, run};
     use contract::catalogue::Catalogue;
 
@@ -192,10 +187,13 @@ mod tests {
     }
 
     /// The lines of runs of the generated case `ball`.
-    fn of_ball(runs: &[Run]) -> Vec<Line> {
+    /// Runs of `ball.toml` in a directory.
+    fn of_ball(place: &Path, runs: &[Run]) -> Vec<Line> {
+        let Base { inputs, .. } = Base::read(&place.join("ball.toml"), None, place).unwrap();
         let of = |run: &Run| {
-            let setup = Setup { case: "ball".into(), ..run.setup.clone() };
-            line(Entry::Run(Box::new(Run { setup, ..run.clone() })))
+            let run = Run { inputs: inputs.clone(), ..run.clone() };
+            let case = if run.setup.case == "a" { "a" } else { "ball" }.to_owned();
+            line(Entry::Run(Box::new(Run { setup: Setup { case, ..run.setup.clone() }, ..run })))
         };
         runs.iter().map(of).collect()
     }
@@ -230,7 +228,7 @@ mod tests {
         let strong = [[1, 2].map(|n| mesh(n, 0.1, 10_000)), [1, 2].map(|n| mesh(n, 0.03, 100_000))];
         let all = [&strong.concat()[..], &[spaced(0.1), spaced(0.05)]].concat();
         let lacking = |runs: &[Run]| {
-            let lines = [of_ball(runs), vec![line(Entry::Run(Box::new(row.clone())))]].concat();
+            let lines = of_ball(place.path(), &[runs, std::slice::from_ref(&row)].concat());
             require_made(&study, &lines, &paths(place.path())).unwrap()
         };
         assert_eq!(lacking(&all), [""; 0]);
@@ -248,11 +246,12 @@ mod tests {
         let warm = Run { warm_up: true, ..spaced(0.05) };
         let with_warm = [&all[..5], &[warm]].concat();
         assert_eq!(lacking(&with_warm), [is_not("mesher ball spacing of 4e5 n=4 solo:1 default")]);
-        let without_row = require_made(&study, &of_ball(&all), &paths(place.path())).unwrap();
+        let without_row =
+            require_made(&study, &of_ball(place.path(), &all), &paths(place.path())).unwrap();
         assert_eq!(without_row, [is_not("the run one")]);
         // What failed is named as such.
         let failed = NoResult { setup: row.setup.clone(), why: "no memory".into() };
-        let lines = [of_ball(&all), vec![line(Entry::Failure(failed))]].concat();
+        let lines = [of_ball(place.path(), &all), vec![line(Entry::Failure(failed))]].concat();
         assert_eq!(require_made(&study, &lines, &paths(place.path())), Ok(vec![]));
     }
 
@@ -268,7 +267,7 @@ mod tests {
             "s.toml",
             "[[series]]\nexperiment = 'strong'\ncase = 'ball.toml'\nengines = ['e.toml']\n",
         );
-        let made = |words: &str, edited: &str, is_older: bool| {
+        let made = |words: &str, edited: &str| {
             put("e.toml", &format!("{words}, '{{case}}', '{{out}}']\n"));
             put("mesh.sh", "true");
             let study = Study::read(&at("s.toml")).unwrap();
@@ -276,18 +275,17 @@ mod tests {
             let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
             (run.setup.weights, run.setup.partitioner) = Default::default();
             (run.setup.engine, run.program) = ("e".into(), digest_of(engine.files()));
-            run.scripts = if is_older { String::new() } else { digest_of_scripts(&engine) };
+            run.scripts = digest_of_scripts(&engine);
             put("mesh.sh", edited);
-            require_made(&study, &of_ball(&[run]), &paths(place.path()))
+            require_made(&study, &of_ball(place.path(), &[run]), &paths(place.path()))
         };
         let own = "program = '{here}/mesh.sh'\n[run]\nserial = ['{program}'";
         let interpreted = "[run]\nserial = ['sh', '{here}/mesh.sh'";
-        for (words, is_older) in [(own, true), (own, false), (interpreted, false)] {
-            assert_eq!(made(words, "true", is_older), Ok(vec![]));
-            let why = made(words, "false", is_older).unwrap_err().why;
+        for words in [own, interpreted] {
+            assert_eq!(made(words, "true"), Ok(vec![]));
+            let why = made(words, "false").unwrap_err().why;
             assert!(why.contains("e.toml: its program is not that of the record"), "{why}");
         }
-        assert_eq!(made(interpreted, "false", true), Ok(vec![]));
     }
 
     #[test]

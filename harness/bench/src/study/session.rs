@@ -15,7 +15,7 @@ use crate::experiments::{machine, network};
 use crate::jsonl;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{Failure, Progress, Result, Watch};
+use contract::failure::{Failure, Progress, Result};
 use run::engine::interrupt;
 use run::engine::layout::Launcher;
 use run::engine::runner::Programs;
@@ -121,8 +121,10 @@ pub fn measure(
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
     let mut of_rows = study.row.iter().flat_map(Row::runs).map(|name| study.run[name].comm);
-    let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty())
+    let is_mpi = |(of, _): &(Setup, usize)| of.comm == Comm::Mpi;
+    let asks = study.series.iter().any(|series| !series.mpi.is_empty())
         || of_rows.any(|comm| comm == Comm::Mpi);
+    let has_mpi = study.repeated.as_ref().map_or(asks, |runs| runs.iter().any(is_mpi));
     let is_missing = has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
     let why = format!("{} is missing: runs on MPI were left out", launcher.program().display());
     Ok(Outcome { rows, lines: session.lines, interrupted, missing: is_missing.then_some(why) })

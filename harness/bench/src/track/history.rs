@@ -97,7 +97,9 @@ impl Record {
     /// One sentence, if it is neither, of another commit, or of a working tree with changes and no commit is named.
     pub fn of_gate(text: &[u8], named: Option<&str>, repository: &Path) -> Result<Self, String> {
         let of = Measures::parse(text)?.of;
-        if named.is_none() && of.revision.is_none() && of.is_built() {
+        let status = ["status", "--porcelain", "--untracked-files=no"];
+        let is_changed = || git(repository, &status).is_some_and(|files| !files.is_empty());
+        if named.is_none() && of.revision.is_none() && (of.is_built() || is_changed()) {
             let why = "a working tree with changes was measured, which is no commit: measure again after committing, or give --commit";
             return Err(why.to_owned());
         }

@@ -222,7 +222,10 @@ fn is_result(line: &Line) -> bool {
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program
 /// in an experiment on a case.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
-    let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
+    let has_failed = lines.iter().zip(1..).any(|(line, after)| {
+        let is_repeated = |later: &Line| is_result(later) && later.setup() == line.setup();
+        matches!(line.entry, Entry::Failure(_)) && !lines[after..].iter().any(is_repeated)
+    });
     fn of_series(setup: &Setup) -> [&str; 3] {
         [&setup.engine, &setup.experiment, &setup.case]
     }
@@ -231,15 +234,13 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let left = lines.iter().filter(|line| matches!(line.entry, Entry::LeftOut(_)));
     // A row says itself that it was left out.
     let mut left = left.filter_map(Line::setup).map(of_series).filter(|of| of[1] != TARGETS);
-    if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && lines.iter().any(failed) {
+    if rows.iter().any(Judged::is_bad) || !study.series.is_empty() && has_failed {
         return EXIT_FAILED;
     }
     let (without, has_series) = (left.find(|of| !runs.contains(of)), !study.series.is_empty());
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
-        _ if has_series && runs.is_empty() => {
-            "nothing was measured of the study: request fewer cells, or name another record"
-        }
+        _ if has_series && runs.is_empty() => "no series was measured: request fewer cells",
         Some(of) => &format!("nothing was measured of {}: the report says why", of.join(", ")),
         None => return EXIT_HOLDS,
     };

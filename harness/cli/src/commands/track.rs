@@ -72,10 +72,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         return Err(Failure::missing(format!("{shown}: {why}")));
     }
     let last_record = records.len() - 1;
-    let ended = || all.iter().filter(|s| s.points.last().is_none_or(|p| p.0 < last_record));
-    if let Some(first) = ended().next() {
-        println!("not in the last record: {} metrics, such as {}", ended().count(), first.name);
-    }
+    let ended = all.iter().filter(|s| s.points.last().is_none_or(|p| p.0 < last_record));
+    ended.for_each(|series| println!("not in the last record: {}", series.name));
     print!("{}", summary(&all));
     let few = all.iter().filter(|series| series.points.len() < VALUES_MIN).count();
     if few > 0 {

@@ -386,7 +386,7 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     fixture.write("record.json", &measured("other", 1));
     let ended = fixture.harness("track history.jsonl --add record.json");
     assert_eq!(ended.code, 0, "{}", ended.printed);
-    let named = "not in the last record: 1 metrics, such as case/words";
+    let named = "not in the last record: case/words";
     assert!(ended.printed.contains(named), "{}", ended.printed);
     fs::write(fixture.path("empty.jsonl"), "").unwrap();
     let nothing = fixture.harness("track empty.jsonl");

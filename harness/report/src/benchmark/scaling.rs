@@ -27,7 +27,9 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     for (subject, all) in by_subject(groups, "strong") {
         let mut meshes = by_key(all.iter().copied(), |group| group.cells());
         meshes.sort_by_key(|(cells, _)| *cells);
-        for (cells, all) in meshes {
+        for (cells, mut all) in meshes {
+            // A program whose mesh depends on the ranks has no speedup.
+            all.retain(|group| groups.reference(group).cells() == cells);
             let file = format!("{}-{}", subject.file(), cells_label(cells));
             if all.iter().any(|group| group.setup.ranks > 1) {
                 out.push(speedup(groups, subject, &all, &file));

@@ -54,14 +54,14 @@ pub struct Watch<'a> {
     pub logs: &'a Path,
     /// Directory in which rank N keeps its current activity in the file `rank-NNNNN.txt`.
     pub status: Option<&'a Path>,
-    /// Sample the memory of the child and its descendants.
-    pub sample_memory: bool,
+    /// The least number of processes of which the memory is sampled together; none if it is not.
+    pub sampled: Option<usize>,
 }
 
 impl<'a> Watch<'a> {
     /// A child without status files and memory samples.
     pub fn new(name: &'a str, limit: Duration, logs: &'a Path) -> Self {
-        Self { name, limit, logs, status: None, sample_memory: false }
+        Self { name, limit, logs, status: None, sampled: None }
     }
 
     pub(super) fn log(&self, stream: &str) -> PathBuf {
@@ -126,12 +126,11 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     };
     let (start, mut session, outputs) =
         start().map_err(|error| cannot_be_started(command, &error))?;
-    let mut peak_rss_bytes = watch.sample_memory.then_some(0);
+    let mut peak_rss_bytes = None;
     let outputs = outputs.each_ref();
     let ended = watch.until(start, &outputs, || {
-        if let Some(peak) = &mut peak_rss_bytes {
-            *peak = peak_bytes(session.leader).max(*peak);
-        }
+        let sample = watch.sampled.and_then(|least| peak_bytes(session.leader, least));
+        peak_rss_bytes = peak_rss_bytes.max(sample);
         session.wait((start.elapsed() / LOOKS).clamp(PAUSES[0], PAUSES[1]))
     });
     let time_wall_s = start.elapsed().as_secs_f64();

@@ -278,7 +278,8 @@ impl Engine {
         let label = self.label();
         let watch = Watch {
             status: status.as_deref(),
-            sample_memory: !self.description.reports_memory,
+            sampled: (!self.description.reports_memory)
+                .then_some(if let Ranks::Mpi(count) = ranks { count } else { 1 }),
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };

@@ -187,14 +187,16 @@ fn is_alive(stat: &str) -> bool {
     stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }
 
-/// The sum of the peaks of memory of all live processes of a session, for programs that do not report it; 0 if the system does not report
-/// them. The system keeps the peak of each process, so only memory that is first used after the last look is missed.
-pub(super) fn peak_bytes(leader: Pid) -> u64 {
+/// The sum of the peaks of memory of all live processes of a session, for programs that do not report it; none if these are fewer than the
+/// `least`, as where another program than the leader starts ranks. The system keeps the peak of each, so only memory that is first used after
+/// the last look is missed.
+pub(super) fn peak_bytes(leader: Pid, least: usize) -> Option<u64> {
     let statuses = members(leader).into_iter().filter_map(|id| {
         let status = fs::read_to_string(format!("/proc/{}/status", id.as_raw_nonzero())).ok()?;
         Some((id.as_raw_nonzero().get().cast_unsigned().into(), Status::parse(&status)?))
     });
-    total_bytes(&statuses.collect())
+    let statuses: BTreeMap<u64, Status> = statuses.collect();
+    (statuses.len() >= least).then(|| total_bytes(&statuses))
 }
 
 /// A process, of which `/proc/ID/status` has the parent and the peaks of the address space and of resident memory.
@@ -260,7 +262,7 @@ mod tests {
         let mut line = [0; 6];
         child.stderr.take().unwrap().read_exact(&mut line).unwrap();
         // The last bytes may still be in the pipe.
-        while peak_bytes(Pid::from_child(&child)) < 29_000_000 {}
+        while peak_bytes(Pid::from_child(&child), 1) < Some(29_000_000) {}
         drop(child.stdin.take());
         assert!(child.wait().unwrap().success());
     }
