@@ -422,7 +422,9 @@ def main():
     shutil.rmtree(scratch, ignore_errors=True)
     print(f"{given.crate}: {cpu_s():.0f} s of CPU time in all")
     complete = summary(given.crate, len(every), len(apart), outcomes, len(mutants) - len(viable), known)
-    sys.exit(0 if complete else 1)
+    if not outcomes:
+        print(f"{given.crate}: no change was tried")
+    sys.exit(0 if complete and outcomes else 1)
 
 
 if __name__ == "__main__":

@@ -78,15 +78,15 @@ def gate(place, kind, percent, trial):
         return
     cpu, wall = layers["time"]
     runs = [line.split() for line in open(f"{place}/times")]
-    # Four runs of other layers, two that warm up, and rounds of three; then the second measurement, if there was one.
-    runs = runs[4 if "counters" in layers else 0 :]
+    # Six runs of other layers, two that warm up, and rounds of three; then the second measurement, if there was one.
+    runs = runs[6 if "counters" in layers else 0 :]
     last = int(max((cpu["note"], wall["note"]), key=lambda note: "second" in note).split()[0])
     once = len(runs) == 2 + 3 * last
     rounds = (len(runs) - (2 if once else 4)) // 3
     count = rounds if once else rounds - last
     first = runs[2 : 2 + 3 * count]
     times = {label: [[float(x) for x in run[1:]] for run in first if run[0] == label] for label in ("baseline", "candidate")}
-    assert [len(of) for of in times.values()] == [2 * count, count], place
+    assert count > 0 and [len(of) for of in times.values()] == [2 * count, count], place
     found = [
         int(red)
         for which in (0, 1)
