@@ -268,12 +268,11 @@ def bricks_dilated(k):
 @fact(TILE, ("& 0xffff) * 0x1248)", "& 0xffff) * 0x1240)"), ("let pairs = rows | rows >> 1;", "let pairs = rows | rows >> 2;"),
       ("self.columns_at[z + dz] |= columns << y;", "self.columns_at[z + dz] |= columns << (y + 1);"), ("m + start - r..m + end + r)", "m + start - r..m + end)"))
 def layers_dilated(k):
-    """The same for all 2^16 sources in the lowest or the highest layer of a brick alone, whose rows are dilated only from the first source to the last."""
+    """The same for all 2^16 sources in the highest layer of a brick alone, with r = 2, whose rows are dilated only from the first source to the last."""
     def first_and_last(run, bits, y):
         has = lambda i: run.truth(z3.Extract(i, i, bits.x) == 1)
         first = next((i for i in range(y, y + 3) if has(i)), y + 3)
         return Range(usize(first), usize(next((i for i in range(y + 3, first, -1) if has(i)), first) + 1), [])
-    for at, r, z in (((0, 7, 7), 1, 0), ((7, 0, 3), 2, 3)):
-        w = k.bits("u64")
-        of_layer = Number("u64", word(bit(w, i) if p[2] == z else no(i) for i, p in enumerate(OCTANTS)))
-        yield from dilations(k, of_layer, at, r, first_and_last)
+    w = k.bits("u64")
+    of_layer = Number("u64", word(bit(w, i) if p[2] == 3 else no(i) for i, p in enumerate(OCTANTS)))
+    yield from dilations(k, of_layer, (7, 0, 3), 2, first_and_last)
