@@ -238,6 +238,7 @@ mod tests {
     use crate::gate::measures::Measured;
     use crate::jsonl::append;
     use std::fs;
+    use std::process::Command;
 
     fn record(commit: &str, metrics: &[(&str, f64)]) -> Record {
         let metrics = metrics.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
@@ -431,7 +432,14 @@ mod tests {
         let case = measures.cases.entry("cube".into()).or_default();
         case.exact.insert("rays".into(), 6);
         case.counted.insert("instructions".into(), 7);
-        let here = Path::new(".");
+        let place = tempfile::tempdir().unwrap();
+        let here = place.path();
+        fs::write(here.join("source"), "old").unwrap();
+        let add = "git init --quiet && git add source";
+        let commit = "git -c user.name=a -c user.email=a@b commit --quiet --message m";
+        let script = format!("{add} && {commit}");
+        let made = Command::new("sh").args(["-c", &script]).current_dir(here).status();
+        assert!(made.unwrap().success());
         let of = |measures: &Measures, named| {
             Record::of_gate(&serde_json::to_vec(measures).unwrap(), named, here)
         };
@@ -441,6 +449,11 @@ mod tests {
             [("cube/instructions".into(), 7.0), ("cube/rays".into(), 6.0)].into()
         );
         assert_eq!(one.commit, Record::of_commit("HEAD", here).unwrap().commit);
+        // Nobody knows of which commit a program is that was measured beside changes.
+        fs::write(here.join("source"), "new").unwrap();
+        assert!(of(&measures, None).unwrap_err().contains("give --commit"));
+        assert_eq!(of(&measures, Some("HEAD")).as_ref(), Ok(&one));
+        fs::write(here.join("source"), "old").unwrap();
         // The revision that was measured counts, and no other.
         measures.of.revision = Some(one.commit.clone());
         assert_eq!(of(&measures, Some("HEAD")), Ok(one));
