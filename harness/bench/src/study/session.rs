@@ -160,6 +160,8 @@ impl Session<'_> {
         if let Some(runs) = &study.repeated {
             return self.repeat(runs);
         }
+        // A case that cannot be read ends the session before its first run.
+        study.series.iter().try_for_each(|series| self.base(&series.case, None).map(drop))?;
         for (series, cells) in study.series.iter().flat_map(Series::sizes) {
             let points = self.of_series(series, cells)?;
             self.make(points)?;

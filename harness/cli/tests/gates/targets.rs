@@ -313,6 +313,17 @@ fn a_run_of_other_facets_than_the_case_has_fails() {
     assert!(bench.code == 1 && bench.printed.contains(why), "{}", bench.printed);
 }
 
+#[test]
+fn a_series_whose_case_is_missing_is_noticed_before_the_first_run() {
+    let fixture = scripted();
+    let series = |case: &str| format!("[[series]]\ncase = '{case}'\nexperiment = 'strong'\n");
+    fixture.write("study.toml", &(series("case.toml") + &series("absent.toml")));
+    let bench = fixture.harness("bench study.toml --mesher ./mesher --record r.jsonl");
+    assert!(bench.code == 2 && bench.printed.contains("absent.toml"), "{}", bench.printed);
+    let record = fs::read_to_string(fixture.path("r.jsonl")).unwrap();
+    assert!(!record.contains("\"kind\":\"run\""), "{record}");
+}
+
 /// The report says why.
 #[test]
 fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
