@@ -1,17 +1,15 @@
 //! Refinement around facets and extent boxes: from facets to the base tree T0 (the paper's section II.B), on the ranks that own its
 //! octants.
 //!
-//! Every facet is sent to the owners of the octants that its extent reaches; each rank then voxelises its own octants: depth first from
-//! the root, two levels at a time, where the rank owns a part. The facets of a brick are tested against
-//! its 64 octants at once, and each crossed octant receives the list of the facets that cross it. The
-//! level between follows by coarsening: as octants are closed, an octant is crossed if and only if one of
-//! its children is.
+//! Every facet is sent to the owners of the octants that its extent reaches; each rank then voxelises its own octants: depth first from the
+//! root, two levels at a time, where the rank owns a part. The facets of a brick are tested against its 64 octants at once, and each
+//! crossed octant receives the list of the facets that cross it. The level between follows by coarsening: as octants are closed, an octant
+//! is crossed if and only if one of its children is.
 //!
-//! Facets are binned by their *containing octant*, the smallest octant that contains the facet's extent.
-//! A facet crosses all ancestors of its containing octant, so it need not be tested at the levels above
-//! it, and the facets contained in an octant are a contiguous range. A facet smaller than a leaf therefore
-//! costs a sort and one bit. Facets that cross an octant without being contained in it are *straddling*:
-//! they are passed down in lists.
+//! Facets are binned by their *containing octant*, the smallest octant that contains the facet's extent. A facet crosses all ancestors of
+//! its containing octant, so it need not be tested at the levels above it, and the facets contained in an octant are a contiguous range. A
+//! facet smaller than a leaf therefore costs a sort and one bit. Facets that cross an octant without being contained in it are
+//! *straddling*: they are passed down in lists.
 //!
 //! Invariants:
 //! - a rank has every facet whose extent reaches an octant that it owns, once;
@@ -155,9 +153,8 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
         tests: vec![FacetTest::default(); TESTS_KEPT],
         counters: Counters::default(),
     };
-    let all = [0..binned.facets.len(), 0..0];
     // The tested levels have the parity of the surface level, so that one of them is that level.
-    v.brick(rules.level_surface & 1, 0, all, &rules.boxes);
+    v.brick(rules.level_surface & 1, 0, (0..binned.facets.len(), 0), &rules.boxes);
     (v.tree, v.counters)
 }
 
@@ -178,8 +175,8 @@ struct Voxeliser<'a> {
     counters: Counters,
 }
 
-/// The facets of a brick: those contained in the octant that it fills, and those that straddle its boundary.
-type BrickFacets = [Range<usize>; 2];
+/// The facets that each octant of a brick contains; none if all contain none.
+type Runs = Option<[(u32, u32); 64]>;
 
 impl Voxeliser<'_> {
     /// The octants of level `l` in a brick in which the rank owns a part.
@@ -196,18 +193,21 @@ impl Voxeliser<'_> {
         (0..64).fold(0, |all, bit| all | u64::from(meets(key << 6 | bit)) << bit)
     }
 
-    /// Decides the octants of level `l` in a brick and their parents, and continues with their descendants.
-    fn brick(&mut self, l: Level, key: u64, facets: BrickFacets, boxes: &[ExtentBox]) {
-        let [contained, straddling] = facets;
+    /// Decides the octants of level `l` in a brick and their parents, and continues with their descendants. The octant that the brick fills
+    /// contains the facets `contained`; those in `lists` from `straddling` on straddle its boundary.
+    fn brick(&mut self, l: Level, key: u64, facets: (Range<usize>, usize), boxes: &[ExtentBox]) {
+        let (contained, straddling) = facets;
         self.counters.bricks_voxelised += 1;
         let (min_corner, allowed) = (brick::min_corner(l, key), self.allowed(l, key));
-        let first_pair = self.pairs.len();
-        let mut runs = None;
-        let crossing = (straddling.fold(0, |all, i| all | self.test(self.lists[i], l, min_corner))
-            | self.bin_contained(contained, l, min_corner, &mut runs))
-            & allowed;
         let is_near = |b: &&ExtentBox| b.level >= l && box_mask(b, min_corner, l) != 0;
         let near: Vec<ExtentBox> = boxes.iter().filter(is_near).copied().collect();
+        let is_last = l >= self.surface && near.iter().all(|b| b.level <= l);
+        let first_pair = self.pairs.len();
+        let (binned, runs) = self.bin_contained(contained, l);
+        // Facets contained in the octants come first: where facets are small, the others mostly need no test then.
+        let crossing = (straddling..self.lists.len()).fold(binned, |all, i| {
+            all | self.test(self.lists[i], l, min_corner, is_last.then_some(all))
+        }) & allowed;
         let asked = |least: Level| {
             let asking = near.iter().filter(|b| b.level > least);
             asking.fold(0, |mask, b| mask | box_mask(b, min_corner, l))
@@ -232,16 +232,16 @@ impl Voxeliser<'_> {
                 self.lists[end] = *facet;
                 end += usize::from(octants >> bit & 1 == 1);
             }
+            self.lists.truncate(end);
             let (from, to) = runs.map_or((0, 0), |runs| runs[bit as usize]);
-            let facets = [from as usize..to as usize, begin..end];
+            let facets = (from as usize..to as usize, begin);
             self.brick(l + 2, key << 6 | u64::from(bit), facets, &near);
             self.lists.truncate(begin);
         }
         self.pairs.truncate(first_pair);
     }
 
-    /// Records the parents, of level `l - 1`, of a brick's octants; returns the octants of level `l` that
-    /// exist.
+    /// Records the parents, of level `l - 1`, of a brick's octants; returns the octants of level `l` that exist.
     fn level_above(&mut self, l: Level, key: u64, crossing: u64, asked: u8) -> u64 {
         let crossed = brick::parents(crossing);
         let split = if l - 1 < self.surface { crossed } else { 0 } | asked;
@@ -253,33 +253,29 @@ impl Voxeliser<'_> {
         brick::children(split)
     }
 
-    /// Tests a facet against a brick; returns the octants that it crosses.
+    /// Tests a facet against a brick; returns the octants that it crosses, and where no list of them is needed, perhaps others that are
+    /// `known` to be crossed.
     #[inline]
-    fn test(&mut self, f: u32, l: Level, min_corner: [i64; 3]) -> u64 {
+    fn test(&mut self, f: u32, l: Level, min_corner: [i64; 3], known: Option<u64>) -> u64 {
         self.counters.facet_brick_tests += 1;
         let facet = &self.binned.facets[f as usize];
-        let mask = self.tests[f as usize % TESTS_KEPT].octants(facet, min_corner, l);
-        if mask != 0 {
+        let kept = &mut self.tests[f as usize % TESTS_KEPT];
+        let mask = kept.octants(facet, min_corner, l, known.unwrap_or(0));
+        if mask != 0 && known.is_none() {
             self.pairs.push((f, mask));
         }
         mask
     }
 
-    /// Bins the contained facets of a brick by octant, into `runs`, and tests those that no octant of the
-    /// brick contains. Returns the octants that are crossed.
-    fn bin_contained(
-        &mut self,
-        contained: Range<usize>,
-        l: Level,
-        min_corner: [i64; 3],
-        runs: &mut Option<[(u32, u32); 64]>,
-    ) -> u64 {
-        let mut crossing = 0;
+    /// Bins the contained facets of a brick by octant. Appends those that no octant of the brick contains to those that straddle its
+    /// boundary. Returns the octants that contain facets.
+    fn bin_contained(&mut self, contained: Range<usize>, l: Level) -> (u64, Runs) {
+        let (mut crossing, mut runs) = (0, None);
         let mut i = contained.start;
         while i < contained.end {
             let octant = self.binned.containing[i];
             if octant.level() < l {
-                crossing |= self.test(i as u32, l, min_corner);
+                self.lists.push(i as u32);
                 i += 1;
                 continue;
             }
@@ -293,7 +289,7 @@ impl Voxeliser<'_> {
             crossing |= 1 << (code & 63);
             i = run;
         }
-        crossing
+        (crossing, runs)
     }
 }
 

@@ -31,7 +31,7 @@ def extents(k):
         extent = [[k.integer("i64", *VERTEX), k.integer("i64", *VERTEX)] for _ in AXES]
         k.given.append(z3.And([low.x <= high.x for low, high in extent]))
         corner = [k.integer("i64", 0, ROOT) for _ in AXES]
-        mask = k("octants", Struct(), Struct(), corner, u32(l), file=FACET, replaced={**every, "prepared": lambda *_: Struct(), "range": lambda run, f, axis: extent[axis]})
+        mask = k("octants", Struct(), Struct(), corner, u32(l), k.bits("u64"), file=FACET, replaced={**every, "prepared": lambda *_: Struct(), "range": lambda run, f, axis: extent[axis]})
         meets = [[z3.And(extent[a][0].x <= corner[a].x + (i + 1) * h, extent[a][1].x >= corner[a].x + i * h) for i in range(4)] for a in AXES]
         yield z3.And([has(mask, i) == z3.And([meets[a][p[a]] for a in AXES]) for i, p in enumerate(OCTANTS)])
 
