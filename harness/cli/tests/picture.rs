@@ -53,6 +53,8 @@ impl Fixture {
     /// Exit code, and standard output and error, of `harness picture`.
     fn picture(&self, arguments: &str) -> (i32, String) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        // The programs may lie outside of the repository.
+        command.env("HARNESS_ROOT", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
         command.arg("picture").args(arguments.split(' '));
         if !arguments.starts_with("mesh ") {
             command.args(["--mesher", "mesher"]);
