@@ -208,10 +208,8 @@ impl Voxeliser<'_> {
         let crossing = (straddling..self.lists.len()).fold(binned, |all, i| {
             all | self.test(self.lists[i], l, min_corner, is_last.then_some(all))
         }) & allowed;
-        let asked = |least: Level| {
-            let asking = near.iter().filter(|b| b.level > least);
-            asking.fold(0, |mask, b| mask | box_mask(b, min_corner, l))
-        };
+        let of_box = |b: &ExtentBox| box_mask(b, min_corner, l);
+        let asked = |least| near.iter().filter(|b| b.level > least).fold(0, |m, b| m | of_box(b));
         let split = if l < self.surface { crossing } else { 0 } | asked(l) & allowed;
         let exists = if l == 0 {
             1

@@ -170,19 +170,23 @@ fn what_cannot_be_meant_is_invalid_input() {
 #[test]
 fn programs_of_one_name_are_not_compared() {
     let place = tempfile::tempdir().unwrap();
-    let file = |directory: &str| {
-        let path = place.path().join(directory).join("mine.toml");
+    let file = |name: &str| {
+        let path = place.path().join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, "[run]\nserial = ['mine', '{case}', '{out}']\n").unwrap();
         path.to_string_lossy().into_owned()
     };
-    let both = format!("{},{}", file("a"), file("b"));
+    let both = format!("{},{}", file("a/mine.toml"), file("b/mine.toml"));
+    let punctuated = format!("{},{}", file("x+y.toml"), file("x-y.toml"));
     let refused = |arguments: &[&str]| {
         let output = harness(arguments);
         assert_eq!(output.status.code(), Some(2), "{output:?}");
         String::from_utf8(output.stderr).unwrap()
     };
-    assert!(refused(&["bench", "--engine", &both]).contains("two programs of one name"));
+    for two in [&both, &punctuated] {
+        let refused = refused(&["bench", "--engine", two]);
+        assert!(refused.contains("two programs of one name but for punctuation"), "{refused}");
+    }
     let replaced = refused(&["bench", "--engine", &both, "--mesher", "other"]);
     assert!(replaced.contains("name one"), "{replaced}");
 }

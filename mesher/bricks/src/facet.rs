@@ -133,10 +133,8 @@ impl FacetTest {
             wide += usize::from(first < last);
         }
         // A connected set within one row of octants meets each octant that its extent meets.
-        if wide < 2 || mask & !known == 0 {
-            return mask;
-        }
-        mask & separated(self.prepared(f), corner, shift)
+        let is_decided = wide < 2 || mask & !known == 0;
+        if is_decided { mask } else { mask & separated(self.prepared(f), corner, shift) }
     }
 }
 

@@ -14,8 +14,8 @@ use ranks::{Comm, gather, uncounted};
 pub struct FacetCounts {
     /// All facets.
     pub total: u64,
-    /// Whether some lie beyond the root, wholly or partly.
-    pub beyond_root: bool,
+    /// Their least distance from the root's boundary in lattice units; negative if some lie beyond the root, wholly or partly.
+    pub margin: i64,
     /// The digest of the geometry.
     pub digest: u128,
 }
@@ -40,10 +40,11 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
     let [low, high] = [bounds.lo, bounds.hi].map(|corner| rules.root.nearest(corner));
-    let beyond_root = low.iter().any(|&c| c < 0) || high.iter().any(|&c| c > ROOT_EDGE);
+    let margin =
+        (0..3).map(|a| low[a].min(ROOT_EDGE.saturating_sub(high[a]))).fold(i64::MAX, i64::min);
     // Each facet is in one slice.
     let digests = uncounted(comm, || gather(comm, &[digest::of_facets(&facets)]));
     let digest = digests.into_iter().fold(0, u128::wrapping_add);
-    let counts = FacetCounts { total: slice.total, beyond_root, digest };
+    let counts = FacetCounts { total: slice.total, margin, digest };
     Ok(Quantised { rules, facets, counts })
 }

@@ -90,12 +90,12 @@ fn record(bytes: &[u8; RECORD as usize]) -> Facet {
 /// Names the first facet that has another coordinate.
 pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
     // Without branches, for the vector lanes.
-    let finite =
-        |of: &[[f32; 3]]| of.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
-    if finite(facets.as_flattened()) {
+    let finite = |of: &[f32]| of.iter().fold(true, |all, x| all & x.is_finite());
+    if finite(facets.as_flattened().as_flattened()) {
         return Ok(());
     }
-    let bad = facets.iter().position(|f| !finite(f)).expect("one of them is not finite");
+    let is_bad = |f: &Facet| !finite(f.as_flattened());
+    let bad = facets.iter().position(is_bad).expect("one of them is not finite");
     Err(Error::input(format!(
         "facet {} has a vertex that is not finite: {:?}: repair the geometry",
         first + bad as u64,

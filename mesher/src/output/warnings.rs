@@ -7,7 +7,7 @@ use crate::sides::{Ambiguous, Summary};
 use bricks::octant::ROOT_EDGE;
 
 const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
-    leaks through an opening that is wider than a cell: close the openings that `harness leak --from X,Y,Z` finds from a point in the flow, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
+    leaks through an opening that is wider than a cell: close the openings that `harness leak CASE --from X,Y,Z` finds from a point in the flow, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
 const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
     to the far field, or set keep = inside if the flow is internal";
 const BOXES_WITHOUT_EFFECT: &str =
@@ -20,17 +20,16 @@ const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts 
 pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     let (leaks, is_final, keep) = (of_leaks(mesh, case_name), !mesh.is_base, mesh.rules.keep);
     let summary = &mesh.sides.summary;
-    let empty = empty_region(keep, summary).filter(|_| is_final);
-    let flow_at_boundary = is_final && summary.inside_reaches_boundary;
+    let empty = empty_region(keep, summary).filter(|_| is_final && leaks.is_none());
+    let flow_at_boundary = is_final && keep == Keep::Inside && summary.inside_reaches_boundary;
     // These two already advise to enlarge the root.
     let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
-    let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let others = [
         (flow_at_boundary, FLOW_AT_BOUNDARY),
         (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
-        (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
+        (mesh.facets.margin < 0 && !explains_cut, BODY_CUT),
     ];
     let Ambiguous { count, example } = summary.ambiguous;
     let ambiguous = example.map(|[x, y, z]| {
@@ -47,10 +46,17 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
 pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
-        let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
+        let Mesh { rules, facets, sides, .. } = mesh;
+        let empty = empty_region(rules.keep, &sides.summary);
+        // Nothing but an opening joins what surrounds all facets with what rays take for the inside.
+        let is_around = rules.seeds.is_empty() && facets.margin > 0;
         return match mesh.bounds_nothing {
-            true => empty.or_else(|| Some(bounds_nothing(&mesh.rules, case_name))),
-            false => empty.filter(|_| mesh.rules.keep == Keep::Inside),
+            _ if is_around && sides.summary.inside_reaches_boundary => Some(format!(
+                "the geometry leaks: the space around it is inside, because an opening joins it with that in the body: close what \
+                 `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or increase spacing_min"
+            )),
+            true => empty.or_else(|| Some(bounds_nothing(rules, case_name))),
+            false => empty.filter(|_| rules.keep == Keep::Inside),
         };
     };
     let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;

@@ -80,7 +80,7 @@ pub struct Summary {
     /// Components that were decided by majority.
     #[serde(skip)]
     pub ambiguous: Ambiguous,
-    /// Whether the inside is kept and reaches the root's boundary.
+    /// Whether the inside reaches the root's boundary; false where seeds decide it and all is kept.
     #[serde(skip)]
     pub inside_reaches_boundary: bool,
     /// Whether the outside is kept and seeds decide it, and none of it reaches the root's boundary.

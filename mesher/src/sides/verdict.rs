@@ -20,7 +20,7 @@ use bricks::brick::Brick;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton};
 use bricks::tree::LEVELS;
 use bytemuck::allocation::pod_collect_to_vec;
-use ranks::{Comm, all_gather_reduced, gather};
+use ranks::{Comm, all_gather_reduced, gather, uncounted};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::mem::take;
 
@@ -239,19 +239,20 @@ impl Verdict {
             Keep::Inside => !self.inside.is_empty(),
             Keep::All => false,
         };
-        if !matters {
+        if !matters && (!by_rays || self.inside.is_empty()) {
             return;
         }
         let mine = components.at_boundary.iter().map(|&c| [components.label(c), 0]).collect();
-        let far_field = all_gather_reduced(mine, u64::min, base.comm);
+        let gather = || all_gather_reduced(mine, u64::min, base.comm);
+        // The mesh does not depend on them where only a warning does.
+        let far_field = if matters { gather() } else { uncounted(base.comm, gather) };
         let far_field: HashSet<Label> = far_field.into_iter().map(|[label, _]| label).collect();
-        match rules.keep {
-            Keep::Inside => {
-                self.summary.inside_reaches_boundary = !self.inside.is_disjoint(&far_field);
-            }
-            _ if !by_rays => self.summary.flow_misses_boundary = outside.is_disjoint(&far_field),
-            _ if outside.is_disjoint(&far_field) => {}
-            _ => self.enclosed = outside.difference(&far_field).copied().collect(),
+        self.summary.inside_reaches_boundary = !self.inside.is_disjoint(&far_field);
+        let misses = outside.is_disjoint(&far_field);
+        if !by_rays {
+            self.summary.flow_misses_boundary = rules.keep == Keep::Outside && misses;
+        } else if matters && rules.keep == Keep::Outside && !misses {
+            self.enclosed = outside.difference(&far_field).copied().collect();
         }
     }
 

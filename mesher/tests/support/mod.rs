@@ -104,10 +104,12 @@ impl Small {
         let reference::Components { outside, inside, enclosed } = mesh.components;
         let reference::sides::EnclosedComponents { count, leaves, example } = enclosed;
         let enclosed = EnclosedComponents { count, leaves, example };
-        // All inside leaves are kept, and those made by gradation tile the same places.
+        // Nothing is deleted from T0, and the leaves that gradation makes tile the same places.
+        let base = self.reference_mesh(true)?.words;
         let reaches_boundary =
-            |side| mesh.words.iter().any(|&word| word & 3 == side && is_at_boundary(word));
-        let inside_reaches_boundary = self.keep == Keep::Inside && reaches_boundary(1);
+            |side| base.iter().any(|&word| word & 3 == side && is_at_boundary(word));
+        let is_known = self.seeds.is_empty() || self.keep != Keep::All;
+        let inside_reaches_boundary = is_known && reaches_boundary(1);
         let is_seeded = self.keep == Keep::Outside && !self.seeds.is_empty();
         let flow_misses_boundary = is_seeded && !reaches_boundary(0);
         let summary = Summary {

@@ -57,9 +57,11 @@ impl Runner<'_> {
         kept?;
         // Those of rank 0 alone, or without CPU times, say nothing of the ranks.
         let is_of_all = |phase: &PhaseReport| phase.time_cpu_s.len() >= setup.ranks;
-        let phases = if report.phases.iter().all(is_of_all) { &report.phases[..] } else { &[] };
+        let is_known =
+            report.phases.iter().all(is_of_all) && useful_s(setup.ranks, &report.phases).sum > 0.0;
+        let phases = if is_known { &report.phases[..] } else { &[] };
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
-        let why = "its run report has no phases, without which simulated ranks cannot be projected";
+        let why = "its run report has no phases with CPU times, without which simulated ranks cannot be projected";
         Failure::unless(setup.comm != Comm::Sim || !phases.is_empty(), why)?;
         let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use fewer \
              ranks or more cells";

@@ -236,16 +236,10 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
         }
         let bytes = report.peak_rss_bytes_total();
         measures.memory.extend((bytes > 0).then(|| (format!("{prefix}{MEMORY}"), bytes)));
-        if let Some(leaves) = report.counters.get(LEAVES).filter(|of| of.len() == ranks.count()) {
-            let (sum, cells) = (leaves.iter().sum::<u64>(), report.cells);
-            if sum != cells {
-                let why = format!("counts {sum} {LEAVES}, but {cells} cells ({ranks})");
-                return Err(engine.unusable(why));
-            }
-            // The same leaves on fewer of the ranks take longer.
-            let most = leaves.iter().max().filter(|_| leaves.len() > 1);
-            measures.exact.extend(most.map(|most| (format!("{prefix}{LEAVES}_max"), *most)));
-        }
+        let is_of_ranks = |of: &&Vec<u64>| of.len() > 1 && of.len() == ranks.count();
+        // The same leaves on fewer of the ranks take longer.
+        let most = report.counters.get(LEAVES).filter(is_of_ranks).and_then(|of| of.iter().max());
+        measures.exact.extend(most.map(|most| (format!("{prefix}{LEAVES}_max"), *most)));
         for (name, of) in report.counters {
             // A list without a rank counts nothing, not 0.
             let Some(most) = of.iter().max() else { continue };

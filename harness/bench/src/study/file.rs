@@ -297,8 +297,6 @@ impl Study {
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
         let of_series = self.series.iter().map(|series| &series.case);
-        // Names of results have `-` in place of punctuation, so that these would be the same.
-        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         for case in of_series.chain(self.mesh.values().map(|mesh| &mesh.case)) {
             let name = Path::new(case).file_stem().map(|name| plain(&name.to_string_lossy()));
             let other = *cases.entry(name).or_insert(case);
@@ -496,6 +494,11 @@ fn each_run(row: &Row) -> Vec<Row> {
         ..row.clone()
     };
     row.run.iter().map(of).collect()
+}
+
+/// A name in the keys and the files of results, which have `-` in place of punctuation: others must differ from it there.
+pub fn plain(name: &str) -> String {
+    name.replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
 
 #[cfg(test)]

@@ -120,10 +120,9 @@ pub fn measure(
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
-    let mut of_rows = study.row.iter().flat_map(Row::runs).map(|name| study.run[name].comm);
+    let in_rows = study.row.iter().flat_map(Row::runs).any(|run| study.run[run].comm == Comm::Mpi);
     let is_mpi = |(of, _): &(Setup, usize)| of.comm == Comm::Mpi;
-    let asks = study.series.iter().any(|series| !series.mpi.is_empty())
-        || of_rows.any(|comm| comm == Comm::Mpi);
+    let asks = in_rows || study.series.iter().any(|series| !series.mpi.is_empty());
     let has_mpi = study.repeated.as_ref().map_or(asks, |runs| runs.iter().any(is_mpi));
     let is_missing = has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
     let why = format!("{} is missing: runs on MPI were left out", launcher.program().display());
@@ -235,8 +234,7 @@ impl Session<'_> {
                 let why = why.unwrap_or("its engine file does not offer them");
                 let serial = series.setups(engine, None, n, &[(Comm::Solo, 1)]).remove(0);
                 let setup = Setup { spacing_min: base.spacing_min, ..serial };
-                let named = &setup.experiment;
-                let why = format!("{engine} cannot make the runs of the series {named}: {why}");
+                let why = format!("{engine} cannot run the series {}: {why}", setup.experiment);
                 (self.progress)(&why);
                 self.append(Entry::LeftOut(NoResult { setup, why }))?;
             }

@@ -142,8 +142,10 @@ fn programs(given: &Given, study: &mut Study) -> Result<Programs> {
     }
     let mut known = HashSet::new();
     let mut labels = names.iter().map(|name| programs.named(name).label());
-    if let Some(label) = labels.find(|label| !known.insert(label.clone())) {
-        return Err(Failure::input(format!("two programs of one name, {label}: rename a file")));
+    if let Some(label) = labels.find(|label| !known.insert(study::file::plain(label))) {
+        return Err(Failure::input(format!(
+            "two programs of one name but for punctuation, {label}: rename a file"
+        )));
     }
     // Our mesher chooses the spacings, also for other engines.
     let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);

@@ -333,11 +333,11 @@ fn a_series_that_cannot_be_run_is_missing_with_and_without_a_report() {
     for report in ["", " --report out"] {
         let bench = "bench study.toml --mesher ./mesher --no-mpi --record r.jsonl";
         let outcome = fixture.harness(&format!("{bench}{report}"));
-        let why = "mesher cannot make the runs of the series weak: --no-mpi was given";
+        let why = "mesher cannot run the series weak: --no-mpi was given";
         assert!(outcome.code == 3 && outcome.printed.contains(why), "{}", outcome.printed);
     }
     let page = fs::read_to_string(fixture.path("out/index.html")).unwrap();
-    assert!(page.contains("cannot make the runs of the series weak"), "{page}");
+    assert!(page.contains("cannot run the series weak"), "{page}");
     // Of a report alone, this is all that was asked for.
     let alone = fixture.harness("report out --record r.jsonl");
     let why = "no repetition succeeded; the page lists the reasons";

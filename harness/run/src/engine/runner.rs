@@ -256,6 +256,12 @@ impl Engine {
                 self.launcher.program().display()
             ));
         }
+        // The balance of ranks is that of this counter.
+        let leaves = report.counters.get("leaves").filter(|of| of.len() == ranks);
+        let sum = leaves.map_or(report.cells, |of| of.iter().sum());
+        if sum != report.cells {
+            return Err(format!("counts {sum} leaves, but {} cells", report.cells));
+        }
         let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
         if is_of_one || report.peak_rss_bytes.is_empty() {
             report.peak_rss_bytes = finished.peak_rss_bytes.into_iter().collect();

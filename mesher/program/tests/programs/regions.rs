@@ -346,6 +346,19 @@ fn leaks_are_warnings_or_errors() {
         let (warnings, leaks) = with_leaks(&slit(20.0, 11.0, Keep::Inside, vec![]), comm);
         assert_eq!((warnings.len(), leaks), (1, json!([])));
         assert!(warnings[0].starts_with("nothing is inside the geometry"), "{warnings:?}");
+        // The largest leaves, whose rays decide, are in the body, and the space around it has their side.
+        let mut open = cuboid([3.0; 3], [61.0; 3]);
+        open.retain(|f| f.iter().any(|v| v[0] != 3.0));
+        for keep in [Keep::Outside, Keep::All] {
+            let (warnings, leaks) = with_leaks(&case(open.clone(), keep), comm);
+            assert_eq!((warnings.len(), leaks), (2, json!([])), "{warnings:?}");
+            let is_said =
+                warnings[0].starts_with("the geometry leaks: the space around it is inside");
+            assert!(
+                is_said && warnings[1].starts_with("the rays of 1 components disagree"),
+                "{warnings:?}"
+            );
+        }
         let mut sheet = closed;
         sheet.facets.truncate(2);
         assert_eq!(with_leaks(&sheet, comm), (vec![], json!([])));
