@@ -123,7 +123,7 @@ pub struct Answers {
 const FACETS_MAX: usize = 24;
 /// What follows a spacing that closes an opening.
 const CLOSE: &str = "close this opening wherever the lattice lies, and finer ones may on this lattice; others have widths of their own (`harness geometry`).";
-const END: &str = "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends.\n";
+const END: &str = "          This is the widest place near the start or the end: no place between is narrower. Openings beside the points themselves do not count.\n";
 /// What follows where no path explains that the start is outside.
 const ENCLOSED: &str = ": the facets enclose the start, although by its rays it is outside, as beside openings, overlaps and facets that appear \
     twice (`harness geometry`). If the mesher reports that it leaked, its rays have changed their verdict, and no path has opened";
@@ -268,9 +268,8 @@ mod tests {
         assert!(text.starts_with(start), "{text}");
         let verdict = "\nJOINED: start and end lie in one space, or one of them within the opening, at every spacing\n";
         assert!(text.contains(verdict), "{text}");
-        let remark = "facets    3\n          This is an end of the path: no place on the way is narrower, so there is no opening between \
-            the ends.\n";
-        assert!(text.contains(remark) && !text.contains("Spacings above"), "{text}");
+        let remark = format!("facets    3\n{END}");
+        assert!(text.contains(&remark) && !text.contains("Spacings above"), "{text}");
     }
 
     #[test]
