@@ -280,6 +280,8 @@ mod tests {
         assert_eq!(counted("[80]", Comm::Sim), Ok(None));
         let why = "a counter of more numbers than ranks";
         assert!(counted("[30, 25, 25]", Comm::Sim).unwrap_err().contains(why));
+        let why = "counts 79 leaves, but 80 cells";
+        assert!(counted("[30, 49]", Comm::Sim).unwrap_err().contains(why));
     }
 
     /// As of a program that takes milliseconds for seconds.
@@ -306,9 +308,14 @@ mod tests {
 
     #[test]
     fn the_useful_time_of_a_program_without_phases_is_unknown() {
-        let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9}"#;
-        let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
-        assert_eq!((run.useful_s, run.peak_rss_bytes.sum), (Spread::default(), 9.0));
+        // So is that of a program whose clock shows nothing.
+        for phases in ["", r#", "phases": [{"name": "all", "time_cpu_s": [0.0]}]"#] {
+            let report = format!(
+                r#"{{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9{phases}}}"#
+            );
+            let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
+            assert_eq!((run.useful_s, run.peak_rss_bytes.sum), (Spread::default(), 9.0));
+        }
     }
 
     #[test]
