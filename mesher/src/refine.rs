@@ -266,7 +266,7 @@ impl Voxeliser<'_> {
     }
 
     /// Bins the contained facets of a brick by octant. Appends those that no octant of the brick contains to those that straddle its
-    /// boundary. Returns the octants that contain facets.
+    /// boundary. Returns the octants that contain facets, and the facets of each.
     fn bin_contained(&mut self, contained: Range<usize>, l: Level) -> (u64, Runs) {
         let (mut crossing, mut runs) = (0, None);
         let mut i = contained.start;

@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Progress.check()?;
     if ends.is_empty() {
         println!(
-            "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (one that is open at all three is not examined: --from)",
+            "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (not examined, but for --from: a region that is open at all three, and surroundings of the body that are inside, of which the mesher warns)",
             case.name
         );
     }
