@@ -4,10 +4,10 @@ use crate::figure::svg::svg;
 use crate::figure::{
     Axis, Figure, Kind, Point, Provenance, Series as Plotted, file_name, tick_label,
 };
-use crate::junit::{suite, test, to_text, unsuccessful};
+use crate::junit::{skipped, suite, test, to_text, unsuccessful};
 use crate::page::{figure, page as whole_page, table};
 use bench::track::history::Record;
-use bench::track::{Change, Series};
+use bench::track::{Change, Series, VALUES_MIN};
 use maud::{Markup, html};
 use quick_junit::NonSuccessKind::Failure;
 use quick_junit::TestCaseStatus;
@@ -78,8 +78,9 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
 /// Both values of a step with their unit, and the change.
 fn values(series: &Series, change: &Change) -> [String; 3] {
     let value = |value: f64| match series.unit {
-        // Counts are exact.
-        "count" => value.to_string(),
+        // Counts are exact, but for those of a line.
+        "count" if value.abs() >= 1000.0 => value.round().to_string(),
+        "count" => tick_label(value),
         unit => format!("{} {unit}", tick_label(value)),
     };
     let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
@@ -123,6 +124,7 @@ pub fn junit(all: &[Series], recent: usize) -> String {
         let text = summary(std::slice::from_ref(series));
         let ended = match series.worse_recently(recent) {
             Some(_) => unsuccessful(Failure, text.trim_end()),
+            None if series.points.len() < VALUES_MIN => skipped("too few values for a step".into()),
             None => TestCaseStatus::success(),
         };
         test(&series.name, ended, if series.changes.is_empty() { "" } else { &text })
@@ -246,6 +248,8 @@ mod tests {
             quick_junit::Report::deserialize_from_str(&junit(&all, recent)).unwrap().failures
         };
         assert_eq!((failures(10), failures(5)), (1, 0));
+        let few = analyse(&sample()[..4], 0.01);
+        assert_eq!(junit(&few, 10).matches("<skipped").count(), few.len());
     }
 
     #[test]

@@ -14,7 +14,7 @@
 //! alarms by 1 % on independent noise, with 5 % outliers too (0 to 0.8 % of 1,000 series of 20 to 200 values), and by 5 % on
 //! autocorrelated noise and on drifts.
 
-use super::median::median_of;
+use super::median::{median_of, sorted};
 use super::segments::{Fit, Mean, Series};
 use serde::Serialize;
 
@@ -23,9 +23,9 @@ use serde::Serialize;
 pub struct Change {
     /// Index of the first value after it.
     pub at: usize,
-    /// Median of the values since the previous step.
+    /// Median of the values since the previous step; in a drift, what its line has at the step.
     pub before: f64,
-    /// Median of the values up to the next step.
+    /// The same of the values up to the next step.
     pub after: f64,
     /// The p-value.
     pub p: f64,
@@ -80,12 +80,20 @@ pub fn change_points(values: &[f64], alpha: f64) -> Vec<Change> {
     // The variance below which noise is not distinguished from none.
     let mut model = Model::select(&clean, (least / 4.0).max(1e-9).powi(2));
     let p_values = model.steps(least, alpha);
-    let step = |(w, p): (&[usize], f64)| {
-        let at = w[1];
-        let (before, after) = (median_of(&values[w[0]..at]), median_of(&values[at..w[2]]));
-        Change { at, before, after, p }
+    let (edges, fits) = (model.edges(), model.fits(&Series::new(&clean, model.phi)));
+    let is_level = model.mean == Mean::Constant;
+    // The medians of what falls before and after a rise may fall as well.
+    let level = |segment: usize, at: usize| {
+        let part = &values[edges[segment]..edges[segment + 1]];
+        let fitted = middle + size * fits[segment].at(at as f64 - 0.5);
+        let sorted = sorted(part.iter().copied());
+        if is_level { median_of(part) } else { fitted.clamp(sorted[0], sorted[sorted.len() - 1]) }
     };
-    model.edges().windows(3).zip(p_values).map(step).collect()
+    let step = |(before, p): (usize, f64)| {
+        let (at, after) = (edges[before + 1], before + 1);
+        Change { at, before: level(before, at), after: level(after, at), p }
+    };
+    p_values.into_iter().enumerate().map(step).collect()
 }
 
 /// A model of values without outliers.

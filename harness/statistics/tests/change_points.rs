@@ -127,6 +127,23 @@ fn a_step_within_a_drift_is_found() {
     assert_eq!(places(&values), [40]);
 }
 
+/// The median of the values after it is less than that of those before.
+#[test]
+fn a_rise_within_a_fall_is_a_rise() {
+    for at in [60, 90, 110] {
+        for seed in 0..20 {
+            let mut values = independent(120, seed, normal);
+            values.iter_mut().enumerate().for_each(|(i, value)| *value -= i as f64 / 6.0);
+            values[at..].iter_mut().for_each(|value| *value += 8.0);
+            let found = change_points(&values, 0.01);
+            for Change { before, after, .. } in found.iter().filter(|of| of.at.abs_diff(at) <= 2) {
+                assert!((after - before - 8.0).abs() < 3.0, "{at}, {seed}: {before} to {after}");
+            }
+            assert!(!found.is_empty(), "{at}, {seed}");
+        }
+    }
+}
+
 #[test]
 fn long_histories_rarely_have_a_step_by_chance_and_short_excursions_are_found() {
     let rate = alarms_of(100, |seed| independent(2000, seed, normal));

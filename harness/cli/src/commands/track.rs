@@ -77,9 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     print!("{}", summary(&all));
     let few = all.iter().filter(|series| series.points.len() < VALUES_MIN).count();
     if few > 0 {
-        println!(
-            "in {few} metrics no step can be found yet: they have fewer than {VALUES_MIN} values"
-        );
+        println!("in {few} metrics no step can be found yet: fewer than {VALUES_MIN} values");
     }
     for commit in &arguments.accept {
         let at = records.iter().position(|record| record.commit.starts_with(commit));
