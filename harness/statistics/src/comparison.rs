@@ -34,6 +34,9 @@ const SCALE_BASELINE_DIFFERENCE: f64 = 0.866_025_403_784_438_6;
 /// The 95 % quantile of the standard normal distribution: two measurements both find what each finds in 95 of 100 cases in 90.
 const NORMAL_QUANTILE_95: f64 = 1.6449;
 
+/// Its 99.5 % quantile: the interval of the second measurement lies beyond 0 if the effect is that many deviations from it.
+const NORMAL_QUANTILE_995: f64 = 2.5758;
+
 /// Natural logarithms of the times of one round: baseline, baseline again, candidate.
 pub type Round = [f64; 3];
 
@@ -46,7 +49,7 @@ pub struct Comparison {
     pub p: f64,
     /// Noise floor: the effect that noise alone exceeds with probability `alpha`, from the baseline runs.
     pub floor: f64,
-    /// Minimum detectable effect: one this large is detected twice with a probability of 90 %.
+    /// Minimum detectable effect: one this large is found among all tests, and confirmed, with a probability of 90 %.
     pub visible: f64,
     /// Lower limit of the 99 % bootstrap percentile interval of the effect.
     pub low: f64,
@@ -54,8 +57,8 @@ pub struct Comparison {
     pub high: f64,
 }
 
-/// Compares the candidate with the baseline at significance level `alpha`; reproducible for a given seed.
-pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
+/// Compares the candidate with the baseline at significance level `alpha`, as one of so many tests; reproducible for a given seed.
+pub fn compare(rounds: &[Round], alpha: f64, tests: usize, seed: u64) -> Comparison {
     let mut random = Random(seed);
     let difference = |of: usize, r: &Round| r[of] - (r[(of + 1) % 3] + r[(of + 2) % 3]) / 2.0;
     let differences: Vec<f64> = rounds.iter().map(|r| difference(2, r)).collect();
@@ -67,6 +70,7 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         as_large += usize::from(permuted_effect() >= effect.abs());
         drawn += 1;
     }
+    let permuted = sorted((0..SAMPLES / 4).map(|_| permuted_effect()));
     let of_baseline = rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE);
     let of_baseline: Vec<f64> = of_baseline.collect();
     let null_effects = sorted((0..SAMPLES).map(|_| {
@@ -75,13 +79,15 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let bootstrap_effects = sorted((0..SAMPLES / 4).map(|_| {
         trimmed_mean(differences.iter().map(|_| differences[random.below(differences.len())]))
     }));
-    let floor = quantile(&null_effects, 1.0 - alpha);
+    let (floor, spread) = (quantile(&null_effects, 1.0 - alpha), deviation(&bootstrap_effects));
+    let as_one_of_all = quantile(&permuted, 1.0 - alpha / tests as f64);
+    let needed = as_one_of_all.max(NORMAL_QUANTILE_995 * spread);
     // Of logarithms.
     Comparison {
         effect: effect.exp_m1(),
         p: (1 + as_large) as f64 / (1 + drawn) as f64,
         floor: floor.exp_m1(),
-        visible: (floor + NORMAL_QUANTILE_95 * deviation(&bootstrap_effects)).exp_m1(),
+        visible: (needed + NORMAL_QUANTILE_95 * spread).exp_m1(),
         low: quantile(&bootstrap_effects, 0.005).exp_m1(),
         high: quantile(&bootstrap_effects, 0.995).exp_m1(),
     }
@@ -147,7 +153,8 @@ mod tests {
 
     #[test]
     fn false_alarms_are_as_frequent_as_the_p_value_states() {
-        let found: Vec<f64> = (0..100).map(|s| compare(&rounds(20, 1.0, s), 0.01, s).p).collect();
+        let found: Vec<f64> =
+            (0..100).map(|s| compare(&rounds(20, 1.0, s), 0.01, 1, s).p).collect();
         let below = |p: f64| found.iter().filter(|&&found| found < p).count();
         assert!((1..=14).contains(&below(0.05)), "{}", below(0.05));
         assert!(below(0.001) <= 1);
@@ -156,23 +163,36 @@ mod tests {
     #[test]
     fn effects_above_the_detection_limit_are_detected() {
         let detected = (0..40).filter(|&s| {
-            let found = compare(&rounds(30, 1.10, s), 0.001, s);
+            let found = compare(&rounds(30, 1.10, s), 0.001, 1, s);
             found.p < 0.01 && found.effect > 0.0 && (found.low..found.high).contains(&0.10)
         });
         assert!(detected.count() >= 36);
-        let found = compare(&rounds(30, 1.0, 5), 0.001, 5);
+        let found = compare(&rounds(30, 1.0, 5), 0.001, 1, 5);
         assert!(found.visible < 0.10 && found.visible > found.floor, "{found:?}");
+    }
+
+    /// In the first measurement among ten tests, at the square root of 0.001, and in the second by its interval.
+    #[test]
+    fn an_effect_of_the_limit_is_mostly_found_and_confirmed() {
+        let (level, tests) = (0.001_f64.sqrt(), 10);
+        let limit = |seed| compare(&rounds(60, 1.0, seed), level, tests, seed).visible;
+        let effect = (0..8).map(limit).sum::<f64>() / 8.0;
+        let with_effect = |seed| compare(&rounds(60, 1.0 + effect, seed), level, tests, seed);
+        let is_found = |of: &Comparison| of.p * tests as f64 <= level && of.effect > of.floor;
+        let both = |s: &u64| is_found(&with_effect(*s)) && with_effect(1000 + s).low > 0.0;
+        let found = (0..40).filter(both).count();
+        assert!(found >= 32, "{found} of 40 effects of {effect}");
     }
 
     #[test]
     fn a_faster_candidate_has_a_negative_effect() {
-        assert!(compare(&rounds(30, 0.8, 1), 0.001, 1).effect < -0.15);
+        assert!(compare(&rounds(30, 0.8, 1), 0.001, 1, 1).effect < -0.15);
     }
 
     #[test]
     fn the_same_seed_gives_the_same_result() {
         let rounds = rounds(10, 1.02, 3);
-        assert_eq!(compare(&rounds, 0.001, 9), compare(&rounds, 0.001, 9));
+        assert_eq!(compare(&rounds, 0.001, 1, 9), compare(&rounds, 0.001, 1, 9));
     }
 
     #[test]

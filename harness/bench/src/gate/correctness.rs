@@ -69,7 +69,20 @@ fn findings(
         }
         all.extend(checks().filter_map(|check| finding(case, check, baseline)));
     }
+    // The reference makes no large mesh, for instance.
+    let is_gone = |old: &Check| report.checks.iter().all(|new| key(new) != key(old));
+    let is_lost = |old: &&Check| is_of_mesh(old) && count(old).is_some() && is_gone(old);
+    let lost = baseline.iter().flat_map(|old| &old.checks).filter(is_lost);
+    let lost: Vec<String> = lost.map(key).collect();
+    if !lost.is_empty() && all.iter().all(|finding| finding.verdict < Verdict::Missing) {
+        let why = format!("only the baseline's mesh has these checks: {}", lost.join(", "));
+        all.push(GateFinding::noted(case, CHECKS, Verdict::Missing, why));
+    }
     all
+}
+
+fn is_of_mesh(check: &Check) -> bool {
+    CHECKS_OF_MESHES.iter().any(|of_mesh| of_mesh.name == check.name)
 }
 
 /// The comparison of a check; `None` of one that was left out.
@@ -80,8 +93,7 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
     let old = before.and_then(count);
     let Some(new) = count(check) else {
         let note = || format!("the baseline's is checked, and the candidate's is not: {why}");
-        let is_of_mesh = CHECKS_OF_MESHES.iter().any(|of_mesh| of_mesh.name == check.name);
-        return (is_of_mesh && old.is_some()).then(|| noted(Verdict::Missing, note()));
+        return (is_of_mesh(check) && old.is_some()).then(|| noted(Verdict::Missing, note()));
     };
     let verdict = match new.cmp(&old.unwrap_or(0)) {
         Ordering::Less => Verdict::Improvement,
@@ -170,6 +182,18 @@ mod tests {
         assert_eq!(worst.note, "the baseline does not make a mesh: it crashes");
         let worse = against(&case(&[("layer", 7)]), &baseline);
         assert_eq!((worse.verdict, worse.compared), (Verdict::Regression, 0));
+    }
+
+    #[test]
+    fn a_check_that_only_the_baseline_has_is_missing() {
+        let mut baseline = case(&[]);
+        baseline.checks.push(Check::new("base tree", "identical", Outcome::held(1)));
+        let worst = against(&case(&[]), &baseline);
+        assert_eq!(worst.verdict, Verdict::Missing);
+        assert!(worst.note.ends_with("has these checks: base tree: identical"), "{worst:?}");
+        // What is worse needs no such line.
+        let all = findings(&on(&[]), &case(&[("layer", 1)]), Some(&baseline));
+        assert!(all.iter().all(|finding| finding.verdict != Verdict::Missing), "{all:?}");
     }
 
     #[test]

@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The number of cells, which is known of every program.
@@ -32,8 +32,6 @@ const MEMORY_NOISE_BYTES: u64 = 1 << 20;
 const CONFIRMATIONS: usize = 5;
 const VALGRIND: &str = "valgrind";
 const INSTRUCTIONS: &str = "instructions";
-/// Beginning of the names of the profiles.
-const PROFILE: &str = "callgrind.out";
 
 /// Compares the numbers of a layer.
 pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
@@ -57,30 +55,27 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
                 _ => of_case.clone_from(new),
             }
         }
-        let (verdict, who, why) = match (old, new) {
-            (Some(Ok(old)), Ok(new)) => match judged(bench, case, name, [old, new]) {
-                Ok(findings) => {
-                    layer.findings.extend(findings);
-                    continue;
-                }
-                Err(why) => (Verdict::Regression, "a repetition has no", why),
-            },
+        let found = match (old, new) {
+            (Some(Ok(old)), Ok(new)) => judged(bench, case, name, [old, new]),
             (None, Ok(new)) => {
                 let compared = new.of_layer(name).len() as u64;
                 let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
                 let why = format!("{compared} quantities");
                 let found = GateFinding::noted(&case.name, &name.to_string(), verdict, why);
-                layer.findings.push(GateFinding { compared, ..found });
-                continue;
+                Ok(vec![GateFinding { compared, ..found }])
             }
-            (Some(Err(why)), Ok(_)) => (Verdict::Missing, "the baseline has no", why),
-            (Some(Err(_)), Err(why)) => (Verdict::Missing, "neither program has a", why),
-            (_, Err(why)) => (Verdict::Regression, "the candidate has no", why),
+            (Some(Err(why)), Ok(_)) => Err((Verdict::Missing, "the baseline has no", why)),
+            (Some(Err(_)), Err(why)) => Err((Verdict::Missing, "neither program has a", why)),
+            (_, Err(why)) => Err((Verdict::Regression, "the candidate has no", why)),
         };
-        let note = format!("{who} result: {why}");
-        layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, note));
+        layer.findings.extend(found.unwrap_or_else(|(verdict, who, why)| {
+            vec![GateFinding::noted(&case.name, "runs", verdict, format!("{who} result: {why}"))]
+        }));
     }
 }
+
+/// Why there is nothing to compare: the verdict, whose result is missing, and the cause.
+type NoResult = (Verdict, &'static str, Failure);
 
 /// The findings on two measurements of a case. Sampling misses some peaks of memory and invents none, so growth counts only if the highest
 /// of several runs has it.
@@ -89,7 +84,7 @@ fn judged(
     case: &GateCase,
     layer: LayerName,
     mut pair: [CaseMeasures; 2],
-) -> Result<Vec<GateFinding>, Failure> {
+) -> Result<Vec<GateFinding>, NoResult> {
     let is_accepted = bench.options.accept_meshes;
     let compared = |[old, new]: &[CaseMeasures; 2]| {
         compare(&case.name, layer, [old, new], &bench.rules.tolerance, is_accepted)
@@ -100,8 +95,14 @@ fn judged(
         if !findings.iter().any(|finding| finding.verdict == Verdict::Regression) {
             break;
         }
-        for (of, subject) in pair.iter_mut().zip(bench.baseline.iter().chain([&bench.candidate])) {
-            for (metric, bytes) in count(bench, &subject.engine, case)?.memory {
+        let subjects = bench.baseline.iter().chain([&bench.candidate]);
+        let repeated = [
+            (Verdict::Missing, "a repetition of the baseline has no"),
+            (Verdict::Regression, "a repetition has no"),
+        ];
+        for ((of, subject), (verdict, who)) in pair.iter_mut().zip(subjects).zip(repeated) {
+            let again = count(bench, &subject.engine, case).map_err(|why| (verdict, who, why))?;
+            for (metric, bytes) in again.memory {
                 let highest = of.memory.entry(metric).or_default();
                 *highest = bytes.max(*highest);
             }
@@ -264,13 +265,14 @@ pub(super) fn prefix(ranks: Ranks) -> String {
 pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted {
     let path = bench.prepare(engine, case, "instructions")?;
     let place = bench.place.join("instructions");
+    let profiles = emptied(place.join("profiles"), engine)?;
     // Without output files, the count is that of meshing alone.
     let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.timeout) };
     let plain = engine.command(&path, &SERIAL, &options)?;
     let mut command = Command::new(VALGRIND);
     // The program may be started by a script, and may start others.
     command.args(["--tool=callgrind", "--compress-pos=no", "--trace-children=yes"]);
-    command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
+    command.arg(format!("--callgrind-out-file={}/callgrind.out.%p", profiles.display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.timeout, &place));
@@ -279,7 +281,7 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     let options = RunOptions::new(&again, bench.options.timeout);
     let report = engine.run(&path, &SERIAL, &options)?.report;
     counted?;
-    match counted_by_all(&place) {
+    match counted_by_all(&profiles) {
         Ok(0) => Err(engine.unusable("has no profile with costs by valgrind".to_owned())),
         Ok(count) => Ok(CaseMeasures {
             digest: report.digest,
@@ -291,16 +293,10 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     }
 }
 
-/// The instructions of all processes. One that was replaced by another program has none.
-fn counted_by_all(place: &Path) -> io::Result<u64> {
-    let mut sum = 0;
-    for entry in fs::read_dir(place)? {
-        let entry = entry?;
-        if entry.file_name().to_string_lossy().starts_with(PROFILE) {
-            sum += instructions_in(&fs::read_to_string(entry.path())?);
-        }
-    }
-    Ok(sum)
+/// The instructions of all processes, each with a profile. One that was replaced by another program has none.
+fn counted_by_all(profiles: &Path) -> io::Result<u64> {
+    let count = |path: PathBuf| fs::read_to_string(path).map(|profile| instructions_in(&profile));
+    fs::read_dir(profiles)?.map(|entry| count(entry?.path())).sum()
 }
 
 /// The total of a profile of callgrind, in its last line.

@@ -64,14 +64,9 @@ pub struct TimeRules {
 
 impl Default for TimeRules {
     fn default() -> Self {
-        Self {
-            rounds_min: 15,
-            rounds_max: 120,
-            budget_s: 20.0,
-            alpha: 0.001,
-            effect_min: 1.0,
-            effect_wanted: 10.0,
-        }
+        let (rounds_min, rounds_max, budget_s) = (15, 120, 20.0);
+        let (alpha, effect_min, effect_wanted) = (0.001, 1.0, 10.0);
+        Self { rounds_min, rounds_max, budget_s, alpha, effect_min, effect_wanted }
     }
 }
 

@@ -48,8 +48,8 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
     let rules = &bench.rules.time;
     let mut measured: Vec<(&GateCase, Ranks, Times)> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
-        let real = case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. }));
-        measured.extend(real.map(|ranks| (case, ranks, rounds(bench, case, ranks, false))));
+        let on = |ranks| (case, ranks, rounds(bench, case, ranks, false));
+        measured.extend(layouts(case).map(on));
     }
     // All quantities of all cases are tested together.
     let mut all: Vec<_> = measured.iter_mut().flat_map(|of| &mut of.2).flatten().collect();
@@ -72,6 +72,11 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
             }
         }
     }
+}
+
+/// The ranks on which a case is timed.
+fn layouts(case: &GateCase) -> impl Iterator<Item = Ranks> {
+    case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. }))
 }
 
 /// The CPU times and the wall times of a case, or why it has none, with the verdict on that: the baseline fails, the candidate alone, or
@@ -115,11 +120,13 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
             wall[round][index] = run.time_wall_s.max(1e-6).ln();
         }
     }
+    let kinds = [(CPU, cpu), (WALL, wall)];
+    let tests = kinds.len() * bench.cases_of(LayerName::Time).flat_map(layouts).count();
     let quantity = |(name, rounds): (&str, Vec<Round>)| {
-        let found = compare(&rounds, rules.alpha.sqrt(), seed);
+        let found = compare(&rounds, rules.alpha.sqrt(), tests, seed);
         Quantity { metric: format!("{}{name}", prefix(ranks)), rounds, found, first: None }
     };
-    Ok([(CPU, cpu), (WALL, wall)].map(quantity).into())
+    Ok(kinds.map(quantity).into())
 }
 
 /// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
@@ -231,7 +238,7 @@ mod tests {
         /// Of rounds of which half are disturbed, the means of both programs may have the other order than the effect.
         #[test]
         fn the_times_have_the_ratio_of_the_effect(rounds in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
-            let found = compare(&rounds, 0.01, 1);
+            let found = compare(&rounds, 0.01, 1, 1);
             let (metric, effect) = (CPU.to_owned(), found.effect);
             let times = Quantity { metric, rounds, found, first: None }.times();
             prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);

@@ -565,6 +565,14 @@ fn memory_that_grows_fails_the_gate() {
     let same = fixture.harness(&format!("{gate} --baseline sampled --candidate sampled"));
     assert_eq!(same.code, 0, "{}", same.printed);
     assert!(fs::read_to_string(fixture.path("runs")).unwrap().trim().parse::<u32>().unwrap() > 4);
+    // A baseline that crashes when it is measured again shows nothing about the candidate.
+    let crash = run.replace("runs", "again").replace("peak=", "[ $n -lt 2 ] || exit 9; peak=");
+    let crashes = engine.replace("mesh=right", &format!("{crash}mesh=right"));
+    fixture.program("crashes", &crashes.replace("\"counters\"", reported));
+    let unknown = fixture.harness(&format!("{gate} --baseline crashes --candidate large"));
+    assert_eq!(unknown.code, 3, "{}", unknown.printed);
+    let why = "case: runs; a repetition of the baseline has no result";
+    assert!(unknown.printed.contains(why), "{}", unknown.printed);
 }
 
 #[test]
