@@ -131,66 +131,60 @@ const MESHES_MAX: usize = 16;
 /// Maximum growth of cells from mesh to mesh: a distant extrapolation may be far off.
 const STEP: f64 = 40.0;
 
-/// Known sizes of one case at one n.
-#[derive(Clone, Debug, Default)]
-pub struct Sizes {
-    /// Cells of the meshes so far, by the bits of their spacing.
-    meshes: HashMap<u64, f64>,
-}
+/// Known sizes of one case at one n: cells of the meshes so far, by the bits of their spacing.
+pub type Sizes = HashMap<u64, f64>;
 
-impl Sizes {
-    /// Returns the spacing for about `cells`. `mesh` returns the number of cells at a spacing; `coarse` is the first spacing. The answer does
-    /// not depend on earlier ones, so that a part of a study measures the meshes of the whole: what is known is only not meshed again.
-    ///
-    /// # Errors
-    /// Those of `mesh`.
-    pub fn spacing<E>(
-        &mut self,
-        cells: f64,
-        coarse: f64,
-        mut mesh: impl FnMut(f64) -> Result<u64, E>,
-    ) -> Result<f64, E> {
-        let (mut next, mut answer, mut tried) = (coarse, coarse, Vec::<(f64, f64)>::new());
-        for count in 0..=MESHES_MAX {
-            let off = |mesh: &&(f64, f64)| (mesh.1 / cells).ln().abs();
-            let nearest_of = |is_wanted: &dyn Fn(f64) -> bool| {
-                let wanted = tried.iter().filter(|mesh| is_wanted(mesh.1));
-                wanted.min_by(|a, b| off(a).total_cmp(&off(b))).copied()
-            };
-            if let Some((spacing, made)) = nearest_of(&|_| true) {
-                answer = spacing;
-                if count == MESHES_MAX || (made / cells).ln().abs() < TOLERANCE {
+/// Returns the spacing for about `cells`. `mesh` returns the number of cells at a spacing; `coarse` is the first spacing. The answer does
+/// not depend on earlier ones, so that a part of a study measures the meshes of the whole: what is known is only not meshed again.
+///
+/// # Errors
+/// Those of `mesh`.
+pub fn spacing<E>(
+    known: &mut Sizes,
+    cells: f64,
+    coarse: f64,
+    mut mesh: impl FnMut(f64) -> Result<u64, E>,
+) -> Result<f64, E> {
+    let (mut next, mut answer, mut tried) = (coarse, coarse, Vec::<(f64, f64)>::new());
+    for count in 0..=MESHES_MAX {
+        let off = |mesh: &&(f64, f64)| (mesh.1 / cells).ln().abs();
+        let nearest_of = |is_wanted: &dyn Fn(f64) -> bool| {
+            let wanted = tried.iter().filter(|mesh| is_wanted(mesh.1));
+            wanted.min_by(|a, b| off(a).total_cmp(&off(b))).copied()
+        };
+        if let Some((spacing, made)) = nearest_of(&|_| true) {
+            answer = spacing;
+            if count == MESHES_MAX || (made / cells).ln().abs() < TOLERANCE {
+                break;
+            }
+            // The exponent p in cells ~ spacing^-p.
+            let power = nearest_of(&|other| other != made).map_or(2.0, |other| {
+                ((made / other.1).ln() / (other.0 / spacing).ln()).clamp(1.0, 3.0)
+            });
+            let guess = spacing * (made / cells).powf(1.0 / power);
+            next = match nearest_of(&|other| (other < cells) != (made < cells)) {
+                _ if made < cells / 2.0 => {
+                    let more = (cells / 2.0 / made).clamp(1.5, STEP);
+                    // The exponent grows with refinement up to about 2; a smaller one would overshoot.
+                    spacing / more.powf(1.0 / power.max(2.0))
+                }
+                _ if cells > MADE_MAX => {
+                    answer = guess;
                     break;
                 }
-                // The exponent p in cells ~ spacing^-p.
-                let power = nearest_of(&|other| other != made).map_or(2.0, |other| {
-                    ((made / other.1).ln() / (other.0 / spacing).ln()).clamp(1.0, 3.0)
-                });
-                let guess = spacing * (made / cells).powf(1.0 / power);
-                next = match nearest_of(&|other| (other < cells) != (made < cells)) {
-                    _ if made < cells / 2.0 => {
-                        let more = (cells / 2.0 / made).clamp(1.5, STEP);
-                        // The exponent grows with refinement up to about 2; a smaller one would overshoot.
-                        spacing / more.powf(1.0 / power.max(2.0))
-                    }
-                    _ if cells > MADE_MAX => {
-                        answer = guess;
-                        break;
-                    }
-                    // The number of cells jumps, so extrapolation alone may return to the same meshes.
-                    Some(other) if count % 2 == 1 => (spacing * other.0).sqrt(),
-                    _ => guess,
-                };
-            }
-            let made = match self.meshes.get(&next.to_bits()) {
-                Some(known) => *known,
-                None => mesh(next)?.max(1) as f64,
+                // The number of cells jumps, so extrapolation alone may return to the same meshes.
+                Some(other) if count % 2 == 1 => (spacing * other.0).sqrt(),
+                _ => guess,
             };
-            self.meshes.insert(next.to_bits(), made);
-            tried.push((next, made));
         }
-        Ok(answer)
+        let made = match known.get(&next.to_bits()) {
+            Some(made) => *made,
+            None => mesh(next)?.max(1) as f64,
+        };
+        known.insert(next.to_bits(), made);
+        tried.push((next, made));
     }
+    Ok(answer)
 }
 
 #[cfg(test)]
@@ -266,7 +260,7 @@ mod tests {
                 most = most.max(truth(s));
                 Ok::<u64, ()>(truth(s))
             };
-            let spacing = sizes.spacing(target, 0.2, mesh).unwrap();
+            let spacing = spacing(&mut sizes, target, 0.2, mesh).unwrap();
             let error = truth(spacing) as f64 / target - 1.0;
             assert!(error.abs() < 0.08, "{target}: {error}");
             // Overshooting would be expensive.
@@ -282,7 +276,7 @@ mod tests {
             (40.0 / (s * s) * (1.0 + 0.3 * (level * 3.0).sin())) as u64
         };
         for target in [2e4, 8e4, 3.2e5, 5e6] {
-            let spacing = Sizes::default().spacing(target, 0.2, |s| Ok::<u64, ()>(truth(s)));
+            let spacing = spacing(&mut Sizes::default(), target, 0.2, |s| Ok::<u64, ()>(truth(s)));
             let error = truth(spacing.unwrap()) as f64 / target - 1.0;
             assert!(error.abs() < 0.05, "{target}: {error}");
         }
@@ -297,7 +291,7 @@ mod tests {
                 count += 1;
                 Ok::<u64, ()>((1.0 / (s * s)) as u64)
             };
-            (sizes.spacing(cells, 0.1, mesh).unwrap(), count)
+            (spacing(&mut sizes, cells, 0.1, mesh).unwrap(), count)
         };
         let first = request(1e6);
         assert_eq!(request(1e6), first);
@@ -305,12 +299,13 @@ mod tests {
         assert!(second.1 < 2 * first.1, "{second:?} after {first:?}");
         assert_eq!(request(9e5), second);
         // As without what is known.
-        let alone = Sizes::default().spacing(9e5, 0.1, |s| Ok::<u64, ()>((1.0 / (s * s)) as u64));
+        let alone =
+            spacing(&mut Sizes::default(), 9e5, 0.1, |s| Ok::<u64, ()>((1.0 / (s * s)) as u64));
         assert_eq!(Ok(second.0), alone);
     }
 
     #[test]
     fn errors_are_passed_on() {
-        assert_eq!(Sizes::default().spacing(1e6, 0.1, |_| Err("no")), Err("no"));
+        assert_eq!(spacing(&mut Sizes::default(), 1e6, 0.1, |_| Err("no")), Err("no"));
     }
 }

@@ -80,7 +80,7 @@ impl Runner<'_> {
             oversubscribed: setup.comm == Comm::Mpi
                 && setup.ranks > machine::cores() * node_count(),
             command: shown([command.get_program()].into_iter().chain(command.get_args())),
-            facets: report.facets,
+            facets: report.facets.unwrap_or(0),
             geometry: report.geometry.map(|geometry| geometry.digest),
             inputs: String::new(),
             cells: report.cells,
@@ -100,9 +100,7 @@ impl Runner<'_> {
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
         let wall_s = if setup.comm == Comm::Sim { run.time_launch_s } else { run.time_wall_s };
         let most_s = (1 + machine::cores()) as f64 * (wall_s + CLOCKS_S);
-        let why = format!(
-            "its phases have {busy_s} s of CPU time, more than all cores have in {wall_s} s"
-        );
+        let why = format!("phases have {busy_s} s of CPU time, more than all cores in {wall_s} s");
         Failure::unless(busy_s <= most_s * node_count() as f64, why)?;
         Ok(run)
     }
@@ -301,7 +299,7 @@ mod tests {
             ("[0.01, 5e3]", Comm::Sim, more),
             ("[9.0]", Comm::Solo, brief),
         ] {
-            let why = "s of CPU time, more than all cores have in";
+            let why = "s of CPU time, more than all cores in";
             assert!(with(cpu_s, comm, more).unwrap_err().contains(why));
         }
     }

@@ -284,21 +284,24 @@ impl Groups {
     /// Returns the speedup of a group over its reference, times the ranks of that: over one rank, if it ran on one.
     pub fn speedup(&self, group: &Group) -> Median {
         let base = self.reference(group);
-        self.of_times(group, base.time_s.value * base.setup.ranks as f64 / group.time_s.value)
+        let value = base.time_s.value * base.setup.ranks as f64 / group.time_s.value;
+        self.of_times(group, value, base.time_s)
     }
 
-    /// Returns the efficiency of a group.
+    /// Returns the efficiency of a group: over the useful time of its reference, if that is known.
     pub fn global_efficiency(&self, group: &Group) -> Median {
-        self.of_times(group, group.global_efficiency(self.reference(group)))
+        let base = self.reference(group);
+        let useful = base.median_of(|run| group.efficiency(base).map(|_| run.useful_s.sum));
+        let time = useful.unwrap_or(base.time_s);
+        self.of_times(group, group.global_efficiency(base), time)
     }
 
-    /// Returns a value that is proportional to the time of a group's reference over that of the group. It is in its interval if both times are in
+    /// Returns a value that is proportional to a time of a group's reference over that of the group. It is in its interval if both times are in
     /// theirs: with at least the coverage that remains when both may fail (Bonferroni).
-    fn of_times(&self, group: &Group, value: f64) -> Median {
-        let (t, base) = (group.time_s, self.reference(group));
-        let b = base.time_s;
+    fn of_times(&self, group: &Group, value: f64, b: Median) -> Median {
+        let t = group.time_s;
         let coverage = (t.coverage + b.coverage - 1.0).max(0.0);
-        if base.setup == group.setup || coverage == 0.0 {
+        if self.reference(group).setup == group.setup || coverage == 0.0 {
             return Median { value, low: value, high: value, coverage, ..t };
         }
         let low = value * (b.low / b.value) * (t.value / t.high);

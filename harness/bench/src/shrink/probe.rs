@@ -13,7 +13,6 @@ use run::engine::failure::{End, Failure as Ended};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
 use run::verify::report::RUNS;
-use std::fmt;
 use std::path::Path;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -37,7 +36,8 @@ impl Trial {
 }
 
 /// How a case fails a check.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{check}: {sentence}")]
 pub struct Fault {
     /// The check's name, as in `harness verify`; `runs` for an engine that gives no mesh.
     pub check: String,
@@ -58,12 +58,6 @@ impl Fault {
     /// Whether this is the same fault of, perhaps, another case.
     pub fn is_same_as(&self, other: &Self) -> bool {
         (&self.check, &self.end) == (&other.check, &other.end)
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: {}", self.check, self.sentence)
     }
 }
 

@@ -257,8 +257,11 @@ impl Study {
         let setup = line.setup()?;
         let cells = line.run().filter(|_| is_own(&setup.engine)).map(|run| run.cells);
         let is_of_series = self.series.iter().any(|series| series.asks_for(setup, cells));
-        let is_of_row = || self.run.keys().any(|name| self.is_run(name, setup));
-        (!is_of_series && !is_of_row()).then_some(setup)
+        let is_of_row = |(name, run): (&String, &RunSpec)| {
+            let asked = self.mesh[&run.mesh].cells;
+            self.is_run(name, setup) && asked.is_none_or(|asked| is_near(cells, asked))
+        };
+        (!is_of_series && !self.run.iter().any(is_of_row)).then_some(setup)
     }
 
     /// Returns what this study asks for and these lines have not, a sentence each. Spacings are found in execution, so meshes are counted.
@@ -376,6 +379,11 @@ const CHOICES: [Choice; 6] = [
     ("rebalance", "morton"),
 ];
 
+/// Whether a mesh, if its size is known, has about as many cells as were asked for.
+fn is_near(cells: Option<u64>, asked: f64) -> bool {
+    cells.is_none_or(|cells| (0.25..4.0).contains(&(cells as f64 / asked)))
+}
+
 impl Series {
     /// The name of its case in results.
     pub(super) fn name(&self) -> String {
@@ -398,7 +406,7 @@ impl Series {
         };
         let fits = |asked: &f64| match setup.series_cells {
             Some(of_series) => of_series == *asked,
-            None => cells.is_none_or(|cells| (0.25..4.0).contains(&(cells as f64 / asked))),
+            None => is_near(cells, *asked),
         };
         let division = (setup.weights.as_str(), setup.partitioner.as_str());
         self.is_of(setup)

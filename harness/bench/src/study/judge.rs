@@ -123,7 +123,8 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     let ranking = ["serial", "measured", "oversubscribed", "projected"];
     let rank = |how: &&str| ranking.iter().position(|h| h == how);
     let how = runs.iter().chain([&against]).map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
-    let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
+    let value =
+        (row.measure.of)(&Sample { run: runs[0], runs: &runs, against, phases: &row.phase })?;
     let is_above = row.measure.is_efficiency() && value > ABOVE_ONE;
     let disturbed = is_above.then(|| DISTURBED.to_owned());
     let why = above_one(&efficiencies).or(disturbed).unwrap_or_default();

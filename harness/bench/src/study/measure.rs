@@ -34,18 +34,14 @@ pub(super) enum Input {
 
 /// The input of a row's measure.
 pub(super) struct Sample<'a> {
+    /// The first run.
+    pub run: &'a Group,
     /// The runs: one, unless the measure is that of a series.
     pub runs: &'a [&'a Group],
     /// The run with which it is compared, or itself.
     pub against: &'a Group,
     /// The requested phases, if any.
     pub phases: &'a [String],
-}
-
-impl<'a> Sample<'a> {
-    fn run(&self) -> &'a Group {
-        self.runs[0]
-    }
 }
 
 /// A factor, a number of decimals, and what follows the number.
@@ -65,37 +61,37 @@ const fn measure(
 
 /// All measures.
 pub static MEASURES: [Measure; 15] = [
-    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run().rates().value * 1e6)),
+    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run.rates().value * 1e6)),
     measure("facets_per_second_per_core", Alone, (1e-6, 2, " M facets/s"), |s| {
-        let run = s.run();
+        let run = s.run;
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
     }),
-    measure("seconds", Alone, (1.0, 3, " s"), |s| Ok(s.run().time_s.value)),
-    measure("speed_up", Against, PLAIN, |s| match [s.against.cells(), s.run().cells()] {
+    measure("seconds", Alone, (1.0, 3, " s"), |s| Ok(s.run.time_s.value)),
+    measure("speed_up", Against, PLAIN, |s| match [s.against.cells(), s.run.cells()] {
         [before, cells] if before != cells => {
             let [before, cells] = [before, cells].map(grouped);
             Err(format!("the runs are of different meshes, of {before} and {cells} cells"))
         }
-        _ => Ok(s.against.time_s.value / s.run().time_s.value),
+        _ => Ok(s.against.time_s.value / s.run.time_s.value),
     }),
-    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rates().value / s.against.rates().value)),
-    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| peak(s.run())),
-    measure("bytes_per_cell", Alone, PER_CELL, |s| reported(s.run().bytes_per_cell())),
-    measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),
+    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run.rates().value / s.against.rates().value)),
+    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| peak(s.run)),
+    measure("bytes_per_cell", Alone, PER_CELL, |s| reported(s.run.bytes_per_cell())),
+    measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run, s.against)),
     measure("time_per_cell_growth", Series, PLAIN, |s| Ok(growth(s.runs))),
-    measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run())),
+    measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run)),
     measure("lambda_cells_ratio", Against, PLAIN, |s| {
-        Ok(lambda_cells(s.run())? / lambda_cells(s.against)?)
+        Ok(lambda_cells(s.run)? / lambda_cells(s.against)?)
     }),
     measure("lambda_cpu", Alone, PLAIN, |s| {
-        pop::imbalance(&s.run().typical).ok_or(pop::UNKNOWN.to_owned())
+        pop::imbalance(&s.run.typical).ok_or(pop::UNKNOWN.to_owned())
     }),
     measure("efficiency", Against, PLAIN, |s| match s.against.setup.ranks {
-        1 => Ok(s.run().global_efficiency(s.against)),
+        1 => Ok(s.run.global_efficiency(s.against)),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
     measure("parallel_efficiency", Alone, PLAIN, |s| {
-        s.run().efficiency(s.run()).map(|e| e.parallel()).ok_or(pop::UNKNOWN.to_owned())
+        s.run.efficiency(s.run).map(|e| e.parallel()).ok_or(pop::UNKNOWN.to_owned())
     }),
     measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];
@@ -163,7 +159,7 @@ fn growth(runs: &[&Group]) -> f64 {
 
 /// The fraction of the time that the named phases take, of which each must exist.
 fn share(sample: &Sample) -> Result<f64, String> {
-    let (run, network) = (&sample.run().typical, &sample.run().network);
+    let (run, network) = (&sample.run.typical, &sample.run.network);
     let names = sample.phases;
     let there: Vec<&str> = run.phases.iter().map(|p| p.name.as_str()).collect();
     if let Some(absent) = names.iter().find(|name| !there.contains(&name.as_str())) {
@@ -196,7 +192,12 @@ mod tests {
 
     fn value(name: &str, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {
         let phases = &["b".into()];
-        (named(name).of)(&Sample { runs, against: against.unwrap_or(runs[0]), phases })
+        (named(name).of)(&Sample {
+            run: runs[0],
+            runs,
+            against: against.unwrap_or(runs[0]),
+            phases,
+        })
     }
 
     /// Returns a group with the given ranks, time and cells.
@@ -293,7 +294,7 @@ mod tests {
         assert!(value("efficiency", &[&weak], Some(&two)).is_err());
         let share = |phases: &[&str]| {
             let phases: Vec<String> = phases.iter().map(|p| (*p).to_owned()).collect();
-            let sample = Sample { runs: &[&two], against: &two, phases: &phases };
+            let sample = Sample { run: &two, runs: &[&two], against: &two, phases: &phases };
             (named("phase_share").of)(&sample)
         };
         assert_eq!(share(&["a", "b"]), Ok(1.0));

@@ -5,7 +5,7 @@
 
 use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, judge, unjudged};
-use crate::experiments::cases::{Base, Sizes};
+use crate::experiments::cases::{self, Base, Sizes};
 use crate::experiments::entry::{
     ASSUMED, Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, TARGETS, now_utc,
 };
@@ -102,7 +102,7 @@ pub fn measure(
         options,
         runner: Runner { programs, launcher, limit, place: place.path() },
         progress,
-        name: format!("{}-{}", now_utc(), std::process::id()),
+        name: format!("{}-{}-{}", now_utc(), machine::nodes(), std::process::id()),
         record,
         lines: Vec::new(),
         bases: BTreeMap::new(),
@@ -112,11 +112,10 @@ pub fn measure(
         warm: BTreeSet::new(),
     };
     let mut rows = Vec::new();
-    let done = session.all(&mut rows);
-    let interrupted = done.as_ref().is_err_and(Failure::is_interrupt);
-    if !interrupted {
-        done?;
-    }
+    let interrupted = match session.all(&mut rows) {
+        Err(failure) if failure.is_interrupt() => true,
+        done => done.map(|()| false)?,
+    };
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
@@ -242,7 +241,15 @@ impl Session<'_> {
                 let base = self.base(&series.case, series.facets.map(|of| [of, setup.ranks]))?;
                 let parts = if series.experiment == Experiment::Weak { setup.ranks } else { 1 };
                 let finest = cells.map(|cells| self.spacing(&base, n, cells * parts as f64));
-                let finest = finest.transpose()?.unwrap_or(base.spacing_min);
+                let finest = match finest.transpose() {
+                    Ok(finest) => finest.unwrap_or(base.spacing_min),
+                    // The search would fail for the other setups, too.
+                    Err(failure) => {
+                        let why = format!("no spacing is known for its cells: {}", failure.why);
+                        let setup = Setup { spacing_min: base.spacing_min, ..setup };
+                        return self.failed(setup, Failure { why, ..failure }).map(|()| points);
+                    }
+                };
                 let setup = Setup { spacing_min: finest * setup.spacing_min, ..setup };
                 points.push(self.planned(setup, series.repeats)?);
             }
@@ -253,7 +260,7 @@ impl Session<'_> {
     /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
     fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64> {
         let sizes = self.sizes.entry((base.stem.clone(), n)).or_default();
-        sizes.spacing(cells, base.coarse(), |spacing| {
+        cases::spacing(sizes, cells, base.coarse(), |spacing| {
             let case = base.write(spacing, n, false)?;
             let setup = Setup::serial(&base.name, spacing, n);
             self.runner.run(&setup, &case, None).map(|run| run.cells)
@@ -393,14 +400,20 @@ impl Session<'_> {
                 let inputs = point.inputs.clone();
                 self.append(Entry::Run(Box::new(Run { inputs, ..run })))
             }
-            Err(failure) if failure.is_interrupt() => Err(failure),
-            Err(Failure { why, .. }) => {
-                (self.progress)(&format!("failed: {why}"));
+            Err(failure) => {
                 point.failed = true;
-                let setup = point.setup.clone();
-                self.append(Entry::Failure(NoResult { setup, why }))
+                self.failed(point.setup.clone(), failure)
             }
         }
+    }
+
+    /// Records that a setup has no result, unless the user interrupted it.
+    fn failed(&mut self, setup: Setup, failure: Failure) -> Result<()> {
+        if failure.is_interrupt() {
+            return Err(failure);
+        }
+        (self.progress)(&format!("failed: {}", failure.why));
+        self.append(Entry::Failure(NoResult { setup, why: failure.why }))
     }
 
     /// Requires runs that must have the same mesh to report the same: the time of a wrong mesh is not a result. The mesh of an
@@ -432,32 +445,56 @@ mod tests {
     use super::*;
     use run::engine::runner::Given;
 
-    /// A mesh of the first series is known in the second, and is declined again.
-    #[test]
-    fn a_mesh_that_a_program_declines_is_left_out_of_every_series() {
+    const CUBE: &str =
+        "spacing_min = 0.5\nroot_scale = 2.0\n[generator]\nshape = 'cube'\nfacets = 12\n";
+
+    /// The lines of a study of a cube, with an engine that takes one facet and a mesher that fails.
+    fn lines_of(series: &str) -> Vec<Line> {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let put = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
-        let generator = "[generator]\nshape = 'cube'\nfacets = 12\n";
-        put("cube.toml", &format!("spacing_min = 0.5\nroot_scale = 2.0\n{generator}"));
+        put("cube.toml", CUBE);
         let run = "[run]\nserial = ['{program}']\nout = ['{out}']\n[limits]\nfacets_max = 1\n";
         put("few.toml", &format!("about = 'x'\nprogram = '{{here}}/none'\n{run}"));
-        let series = "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few']\n";
-        put("study.toml", &series.repeat(2));
+        put("study.toml", series);
         let study = Study::read(&at("study.toml")).unwrap();
         let engine = at("few.toml").display().to_string();
-        let programs = Programs::find(&engine, &Given::default()).unwrap();
+        let mut programs = Programs::find(&engine, &Given::default()).unwrap();
+        programs.mesher = programs.mesher.with_program("/bin/false".into()).unwrap();
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
         let (no_mpi, repeat, network) = (true, None, None);
         let timeout = Duration::from_secs(60);
         let options = SessionOptions { no_mpi, repeat, launcher, network, timeout, version: "" };
         let record = at("record.jsonl");
-        let outcome = measure(&options, &record, &study, &programs, &|_| ()).unwrap();
+        measure(&options, &record, &study, &programs, &|_| ()).unwrap().lines
+    }
+
+    /// A mesh of the first series is known in the second, and is declined again.
+    #[test]
+    fn a_mesh_that_a_program_declines_is_left_out_of_every_series() {
+        let series = "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few']\n";
+        let lines = lines_of(&series.repeat(2));
         let is_left_out = |line: &Line| match &line.entry {
             Entry::LeftOut(left) => left.why.contains("facets_max"),
             _ => false,
         };
-        let kinds: Vec<bool> = outcome.lines.iter().map(is_left_out).collect();
-        assert_eq!(kinds, [false, true, true], "a session, and each series: {:?}", outcome.lines);
+        let kinds: Vec<bool> = lines.iter().map(is_left_out).collect();
+        assert_eq!(kinds, [false, true, true], "a session, and each series: {lines:?}");
+    }
+
+    #[test]
+    fn a_search_for_a_spacing_that_fails_is_a_failure_of_its_series_only() {
+        let series = "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few']\n";
+        let lines = lines_of(&format!("{series}cells = [1e3, 1e4]\n{series}"));
+        let kinds: Vec<&str> = lines
+            .iter()
+            .map(|line| match &line.entry {
+                Entry::Session(_) => "session",
+                Entry::Failure(of) if of.why.starts_with("no spacing is known") => "no spacing",
+                Entry::LeftOut(_) => "left out",
+                _ => "other",
+            })
+            .collect();
+        assert_eq!(kinds, ["session", "no spacing", "no spacing", "left out"], "{lines:?}");
     }
 }

@@ -171,7 +171,11 @@ fn publish(study: &Study, rows: &[Judged], lines: &[Line], of: &Arguments) -> Re
     let table = targets(rows, &of.only);
     print!("{}", table.text());
     if let Some(directory) = &of.report {
-        let (path, session) = (directory.join(PAGE), lines.iter().rev().find_map(Line::session));
+        // A later session may have no run for a row.
+        let last = lines.iter().rfind(|line| line.setup().is_some()).or(lines.last());
+        let is_last = |line: &&Line| last.is_some_and(|of| of.session == line.session);
+        let session = lines.iter().filter(is_last).find_map(Line::session);
+        let path = directory.join(PAGE);
         let unknown = || "a machine that the record does not describe".to_owned();
         let machine = session.map_or_else(unknown, |session| session.machine.to_string());
         put(&path, markdown(&table, &machine)).map_err(unwritten(code))?;

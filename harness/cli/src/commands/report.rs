@@ -70,7 +70,7 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let is_figure = |line| line == r"\providecommand{\figures}{figures}";
         let is_figure = text.lines().take(3).any(is_figure);
-        is_old |= is_figure && is_outdated(&path, directory)?;
+        is_old |= is_figure && is_outdated(&path, &text, directory)?;
         if is_figure || path.canonicalize().ok() == own {
             continue;
         }
@@ -87,9 +87,15 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
     Ok((all, is_old))
 }
 
-/// Whether files beside a figure of a report, or below a list of figures, differ from those of the same name in `directory`; prints them.
-fn is_outdated(figure: &Path, directory: &Path) -> Result<bool> {
-    let mut is_outdated = false;
+/// Whether a figure, unless it is a list of them, is none of the report's in `directory`, or files beside it, or below a list, differ from
+/// those of the same name there; prints them.
+fn is_outdated(figure: &Path, text: &str, directory: &Path) -> Result<bool> {
+    let list = fs::read_to_string(directory.join("figures.tex"))?;
+    let name = format!(r"{{\figures/{}}}", figure.file_name().unwrap_or_default().display());
+    let mut is_outdated = !text.starts_with("% Made by") && !list.contains(&name);
+    if is_outdated {
+        println!("{}: the report has no figure of this name", figure.display());
+    }
     let made = fs::read_dir(directory.join("figures"))?.flatten().map(|entry| entry.path());
     for made in made.chain([directory.join("figures.tex")]) {
         let is_read = made.extension().is_some_and(|of| of == "tex" || of == "csv");

@@ -68,6 +68,16 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     // The record of a report may be elsewhere.
     let apart = fixture.harness(&format!("{SHOW} {only} --report apart"));
     assert!(apart.code == 0 && fixture.path("apart/index.html").is_file(), "{}", apart.printed);
+    // A later session, of another program, made none of these runs.
+    let record = fs::read_to_string(fixture.path("out/r.jsonl")).unwrap();
+    let mut later: serde_json::Value =
+        serde_json::from_str(record.lines().next().unwrap()).unwrap();
+    (later["session"], later["machine"]["commit"]) = ("later".into(), "another commit".into());
+    fixture.write("out/later.jsonl", &format!("{record}{later}\n"));
+    let only = "--only rate --record out/later.jsonl --report apart";
+    assert_eq!(fixture.harness(&format!("{SHOW} {only}")).code, 0);
+    let table = fs::read_to_string(fixture.path("apart/targets.md")).unwrap();
+    assert!(table.contains("1 met") && !table.contains("another commit"), "{table}");
     // A text takes its numbers from the record.
     let check = |text: &str| {
         fixture.write("paper.tex", text);
@@ -91,7 +101,8 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     // A text that it includes is a part of it; what the report has just written need not be compared.
     fixture
         .write("parts/one.tex", &format!("\\result{{{key}}}, or 98.76543 s\\input{{parts/one}}"));
-    fixture.write("copy.tex", "%\n\\providecommand{\\figures}{figures}\n98.76543");
+    let figures = "%\n\\providecommand{\\figures}{figures}\n98.76543";
+    fixture.write("copy.tex", &figures.replacen('%', "% Made by `harness report`.", 1));
     let whole = check("\\input{out/numbers}\\input{copy}\\include{parts/one} % \\input{absent}");
     let part = "one.tex, line 1: 98.76543 is written by hand";
     assert!(whole.code == 1 && whole.printed.contains(part), "{}", whole.printed);
@@ -109,6 +120,11 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     fixture.write("old/figures/a.csv", "old");
     let old = with_figures();
     assert!(old.code == 1 && old.printed.contains("a.csv: differs"), "{}", old.printed);
+    // And one that the report no longer has.
+    fixture.write("speedup-old.tex", figures);
+    let gone = check(&format!("\\result{{{key}}}\\input{{speedup-old}}"));
+    let why = "speedup-old.tex: the report has no figure of this name";
+    assert!(gone.code == 1 && gone.printed.contains(why), "{}", gone.printed);
     // Numbers are ASCII, whatever the encoding.
     fs::write(fixture.path("paper.tex"), b"M\xfcller: 98.76543").unwrap();
     let latin = fixture.harness("report out --record out/r.jsonl --check paper.tex");

@@ -227,3 +227,17 @@ fn a_study_asks_for_its_runs_alone() {
         assert_eq!(study.unasked(&line(entry)), Some(&setup));
     }
 }
+
+/// As after an edit of the study.
+#[test]
+fn a_run_of_another_size_is_not_that_of_a_row() {
+    let asks = |cells: &str| {
+        let mesh = format!("[mesh.wing]\ncase = 'cube'\ncells = {cells}\n");
+        let row = "[run]\none = { mesh = 'wing' }\n[[row]]\nname = 'time'\nrun = 'one'\nmeasure = 'seconds'\n";
+        let study = read(&format!("{mesh}{row}")).unwrap();
+        let setup = study.run["one"].setup(0.1, 4);
+        let made = Run { setup, ..run(Comm::Mpi, 2_000_000, &[("a", &[1.0])]) };
+        study.unasked(&line(Entry::Run(Box::new(made)))).is_none()
+    };
+    assert_eq!(["1e6", "2e8"].map(asks), [true, false]);
+}
