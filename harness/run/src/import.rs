@@ -225,7 +225,8 @@ pub(crate) fn complete(
         }
         let case = read_case()?;
         let (sides, position) = (engine.run.sides.clone(), engine.run.position);
-        let request = Request { sides, position, root: Some(case.root), ..Request::default() };
+        // Without a root, so that what lies elsewhere is not moved.
+        let request = Request { sides, position, ..Request::default() };
         let read = import(&written, Some(format), &request, Some(&case), label, options.limit);
         let mut imported = read.map_err(not_imported)?;
         imported.manifest().tree = tree;

@@ -36,18 +36,16 @@ pub fn run<A: AsRef<OsStr>>(
 
 /// The command of a script without arguments.
 fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Failure> {
-    let python = &paths.python;
-    if !python.is_file() {
-        let why = format!("needs Python at {} (ci/setup, or HARNESS_PYTHON)", python.display());
-        return Err(Failure::new(name, End::Missing(why)));
-    }
-    let script = paths.root.join("harness/oracles").join(script);
-    if !script.is_file() {
-        let why = format!("needs {}: set HARNESS_ROOT to the repository", script.display());
-        return Err(Failure::new(name, End::Missing(why)));
+    let (python, script) = (&paths.python, paths.root.join("harness/oracles").join(script));
+    let required = [
+        (python, format!("Python at {} (ci/setup, or HARNESS_PYTHON)", python.display())),
+        (&script, format!("{}: set HARNESS_ROOT to the repository", script.display())),
+    ];
+    if let Some((_, what)) = required.into_iter().find(|(path, _)| !path.is_file()) {
+        return Err(Failure::new(name, End::Missing(format!("needs {what}"))));
     }
     let mut command = Command::new(python);
-    command.arg("-B").arg(script);
+    command.arg("-B").arg(&script);
     Ok(command)
 }
 
@@ -91,8 +89,7 @@ pub fn ask(
     let send = |&oracle: &&str| {
         let files = [&points_file, &body_file, &place.join(oracle)];
         let words = files.map(|file| file.to_string_lossy().into_owned());
-        let command = oracle_command(oracle, paths)?;
-        services.send(oracle, || (command, None), &words).map_err(explained)
+        start(oracle, services, paths).map(|()| services.send(oracle, &words))
     };
     let sent: Vec<Result<(), Failure>> = oracles.iter().map(send).collect();
     let answer = |(&oracle, sent): (&&str, Result<(), Failure>)| {
@@ -108,16 +105,11 @@ pub fn ask(
 /// Starts an oracle, unless it runs.
 ///
 /// # Errors
-/// [`End::Missing`] if Python is missing.
+/// [`End::Missing`] if Python or, as far as a service that ended shows it, a package is missing.
 pub fn start(oracle: &str, services: &Services, paths: &Paths) -> Result<(), Failure> {
-    let command = oracle_command(oracle, paths)?;
-    services.start(oracle, || (command, None))
-}
-
-fn oracle_command(oracle: &str, paths: &Paths) -> Result<Command, Failure> {
     let mut command = script_command(oracle, "sides.py", paths)?;
     command.arg(oracle);
-    Ok(command)
+    services.start(oracle, || (command, None)).map_err(explained)
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {

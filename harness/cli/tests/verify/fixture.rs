@@ -166,6 +166,8 @@ impl Fixture {
             .env("HARNESS_ROOT", self.path("root"));
         let p4est = Some(self.path("p4est")).filter(|program| program.is_file());
         command.env("HARNESS_P4EST", p4est.unwrap_or("/nowhere/p4est".into()));
+        let checker = Some(self.path("proof")).filter(|program| program.is_file());
+        command.envs(checker.map(|program| ("HARNESS_PROVEN", program)));
         command.env("HARNESS_PYTHON", "/nowhere/python");
         command.env("GITHUB_STEP_SUMMARY", self.path("summary.md"));
         let output = command.output().unwrap();

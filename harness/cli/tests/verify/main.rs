@@ -377,12 +377,24 @@ fn the_comparison_with_p4est_is_made_with_what_the_engine_takes_and_writes() {
     }
 }
 
+/// OCaml has the same exit code for an exception that nothing catches as the checker for a file that it cannot use.
+#[test]
+fn a_proven_checker_that_crashes_is_a_failure() {
+    let fixture = Fixture::new();
+    for (why, code) in [("no inputs", 0), ("Fatal error: exception Stack_overflow", 1)] {
+        fixture.script("proof", &format!("echo '{why}' >&2; exit 2"));
+        let outcome = fixture.verify(&["--no-mpi"]);
+        assert_eq!(outcome.code, code, "{}", outcome.printed);
+    }
+}
+
 #[test]
 fn a_run_report_that_contradicts_the_mesh_or_the_case_is_detected() {
     let fixture = Fixture::new();
     for (stated, why) in [
         ("\"cells\": 2", "states 2 cells, and its mesh has 1"),
         ("\"cells\": 1, \"facets\": 3", "reports 3 facets, and the case has "),
+        ("\"cells\": 1, \"facets\": 0", "reports 0 facets, and the case has "),
     ] {
         fixture.script("mesher", &HOLDS.replace("\"cells\": 1", stated));
         let outcome = fixture.verify(&["--no-mpi"]);

@@ -95,14 +95,10 @@ pub struct Takes {
 
 impl Default for Takes {
     fn default() -> Self {
-        Self {
-            generator: false,
-            boxes: true,
-            keep: vec![Keep::Outside, Keep::Inside, Keep::All],
-            drop_crossing: true,
-            seeds: false,
-            keep_enclosed: false,
-        }
+        let (boxes, drop_crossing) = (true, true);
+        let [generator, seeds, keep_enclosed] = [false; 3];
+        let keep = vec![Keep::Outside, Keep::Inside, Keep::All];
+        Self { generator, boxes, keep, drop_crossing, seeds, keep_enclosed }
     }
 }
 

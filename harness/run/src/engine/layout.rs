@@ -143,12 +143,10 @@ impl Launcher {
     /// One sentence, if `{ranks}` is missing.
     pub fn parse(text: &str) -> Result<Self, String> {
         let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-        match words.iter().any(|word| word.contains(RANKS)) {
-            true => Ok(Self { words }),
-            false => Err(format!(
-                "the launcher `{text}` has no place for the number of ranks: write {RANKS} there"
-            )),
-        }
+        let has_place = words.iter().any(|word| word.contains(RANKS));
+        let why = "has no place for the number of ranks";
+        let why = || format!("the launcher `{text}` {why}: write {RANKS} there");
+        has_place.then_some(Self { words }).ok_or_else(why)
     }
 
     /// `mpirun -n {ranks}`, with the program at this path.

@@ -2,7 +2,7 @@
 //!
 //! `cells` is required. Everything else may be missing, and then
 //! - `digest` is that of the mesh, if the run wrote one;
-//! - it is unknown how many ranks there were, and `facets` is 0;
+//! - it is unknown how many ranks and facets there were;
 //! - `peak_rss_bytes` is what was sampled from outside, or empty, and the time is that of the process;
 //! - phases and counters are empty, and so is every list that is missing from a phase.
 //!
@@ -21,9 +21,8 @@ pub struct RunReport {
     pub digest: Option<String>,
     /// Number of ranks; `None` if it is not reported.
     pub ranks: Option<usize>,
-    /// Number of facets.
-    #[serde(default)]
-    pub facets: u64,
+    /// Number of facets; `None` if it is not reported.
+    pub facets: Option<u64>,
     /// The facets as the program read them.
     pub geometry: Option<Geometry>,
     /// The partitioner that was used; `None` if it is not reported, or for a single rank.

@@ -107,15 +107,14 @@ impl Engine {
     pub fn require(&self) -> Result<(), Refusal> {
         let (name, path) = (self.name(), self.program.display());
         let option = if name == "reference" { name } else { "mesher" };
+        let file = format!("in the engine file {name}");
         let first = fill(&self.description.run.serial[0], &self.places);
         let why = match self.program.is_file() {
             // Also an absolute path.
             true if first.contains('{') || on_path(&first).is_some() => return Ok(()),
-            true => format!(
-                "{first} was not found: install it, or correct `serial` in the engine file {name}"
-            ),
+            true => format!("{first} was not found: install it, or correct `serial` {file}"),
             false => format!(
-                "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
+                "the {option} is missing: build {path}, correct `program` {file}, or give another path with --{option}"
             ),
         };
         Err(Refusal::missing(why))
@@ -293,7 +292,8 @@ impl Engine {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
-            services.send(&name, start, &words)?;
+            services.start(&name, start)?;
+            services.send(&name, &words);
             let time_wall_s = services.answer(&name, &watch)?;
             // The CPU time and the memory of a request are not measured.
             let (time_cpu_s, stdout) = (f64::NAN, watch.log("stdout"));

@@ -71,20 +71,14 @@ impl Services {
         Ok(())
     }
 
-    /// Sends a request to the service, which is started unless it runs. [`Self::answer`] must be asked for its answer before the next
-    /// request.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
-    pub fn send(&self, name: &str, start: impl FnOnce() -> Start, words: &[String]) -> Result<()> {
-        self.start(name, start)?;
+    /// Sends a request to a service that was started. [`Self::answer`] must be asked for its answer before the next request.
+    pub fn send(&self, name: &str, words: &[String]) {
         let mut services = self.0.borrow_mut();
         let service = services.get_mut(name).expect("it has been started");
         service.sent = Instant::now();
         let line = serde_json::to_string(words).expect("words are text");
         // That the program has ended is found when it is waited for.
         let _ = service.requests.as_mut().map(|requests| writeln!(requests, "{line}"));
-        Ok(())
     }
 
     /// Waits for the answer to a request, from which the watch's limit counts. Returns the wall time, in seconds.
@@ -209,7 +203,8 @@ mod tests {
         let words = [("good", 0), ("die", 7), ("wrong", 5), ("good", 0)];
         for _ in 0..25 {
             for (name, (word, _)) in words.iter().enumerate() {
-                services.send(&name.to_string(), start, &[(*word).to_owned()]).unwrap();
+                services.start(&name.to_string(), start).unwrap();
+                services.send(&name.to_string(), &[(*word).to_owned()]);
             }
             for (name, (_, code)) in words.iter().enumerate() {
                 let watch = Watch::new("sh", Duration::from_secs(60), place.path());
@@ -233,7 +228,8 @@ mod tests {
         };
         for _ in 0..50 {
             let services = Services::default();
-            services.send("sh", start, &[]).unwrap();
+            services.start("sh", start).unwrap();
+            services.send("sh", &[]);
             let watch = Watch::new("sh", Duration::from_secs(60), place.path());
             let failure = services.answer("sh", &watch).unwrap_err();
             assert_eq!(failure.end, End::Exited { code: 7, error: "bang".to_owned() });

@@ -159,14 +159,14 @@ impl<'a> CaseRun<'a> {
 pub(super) type Step = (&'static str, &'static str);
 /// The check by the proven checker.
 pub const PROOF: Step = ("proof", "accepted");
-/// The checks of the meshes of an engine by other programs, and what they need besides the definition.
+/// The checks of meshes by other programs, and what they need besides the definition.
+const STEPS: [(Step, Need); 3] = [
+    (PROOF, Need::Proof),
+    (("sides", "oracles"), Need::Oracles),
+    (("p4est", "balance"), Need::P4est),
+];
+
+/// Those of the meshes of an engine.
 pub(super) fn steps(engine: &Description) -> &'static [(Step, Need)] {
-    match engine.promises.definition {
-        true => &[
-            (PROOF, Need::Proof),
-            (("sides", "oracles"), Need::Oracles),
-            (("p4est", "balance"), Need::P4est),
-        ],
-        false => &[],
-    }
+    if engine.promises.definition { &STEPS } else { &[] }
 }

@@ -81,9 +81,9 @@ impl CaseRun<'_> {
         };
         let Completed { report, finished, .. } =
             self.program(program).run(case, layout, &options)?;
-        // The first is 0 if the program does not report it, the second if the harness refuses the case.
-        let [read, facets] = [report.facets, self.report.facets];
-        if read > 0 && facets > 0 && read != facets {
+        // It is 0 if the harness refuses the case.
+        let facets = self.report.facets;
+        if let Some(read) = report.facets.filter(|read| facets > 0 && *read != facets) {
             let why = format!("reports {read} facets, and the case has {facets}");
             return Err(self.program(program).unusable(why));
         }

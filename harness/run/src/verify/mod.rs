@@ -53,7 +53,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let Verification { needs, workplace, .. } = verification;
     Progress.step("");
     let interrupted = interrupt::requested();
-    workplace.close(cases.iter().any(|case| case.kept.is_some()) && (options.keep || !interrupted));
+    workplace.close(cases.iter().any(|case| case.kept.is_some()));
     let engine = &programs.engine.description;
     let subjects = case::steps(engine).iter().map(|((subject, _), _)| (*subject).to_owned());
     let report = Report {
