@@ -133,13 +133,19 @@ impl Case {
             let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
             boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
         }
+        let seed = |(i, &seed): (usize, &[f64; 3])| {
+            let at = point(seed);
+            let why =
+                || format!("seed {i} at {at} lies outside the root, {root}; move it into the flow");
+            root.quantise_seed(seed).ok_or_else(why)
+        };
         let rules = Manifest {
             level_surface,
             layer_cells_min,
             keep: file.keep,
             keep_crossing: file.keep_crossing.unwrap_or(true),
             boxes,
-            seeds: seeds_on_lattice(&root, &file.seeds)?,
+            seeds: file.seeds.iter().enumerate().map(seed).collect::<Result<_, String>>()?,
             enclosed: file.enclosed,
             ..Manifest::without_leaves(Tree::Final, root, String::new())
         };
@@ -202,17 +208,6 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
     };
     let vertices = facets.as_flattened().iter().enumerate().map(on_lattice);
     Ok(vertices.collect::<Result<Vec<_>, String>>()?.as_chunks().0.to_vec())
-}
-
-fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
-    let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
-        let outside = || {
-            let at = point(seed);
-            format!("seed {i} at {at} lies outside the root, {root}; move it into the flow")
-        };
-        root.quantise_seed(seed).ok_or_else(outside)
-    };
-    seeds.iter().enumerate().map(on_lattice).collect()
 }
 
 fn positive(what: &str, value: f64) -> Result<()> {

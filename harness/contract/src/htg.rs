@@ -112,9 +112,8 @@ impl TreeFile {
             }
             let children = nodes.get(index + 1).copied().unwrap_or(0);
             if 8 * parents != children {
-                let why = format!(
-                    "{parents} nodes of level {index} are split, and {children} are on the next"
-                );
+                let why =
+                    format!("level {index} splits {parents} nodes, and the next has {children}");
                 return Err(TreeError::Damaged(why));
             }
         }
@@ -484,15 +483,12 @@ mod tests {
             let last = nodes.split.iter().rposition(|&is| is).unwrap();
             nodes.split[last] = false;
         });
-        assert!(
-            less.starts_with("is damaged: ") && less.contains("of level 4 are split, and"),
-            "{less}"
-        );
+        assert!(less.starts_with("is damaged: ") && less.contains("level 4 splits "), "{less}");
         let more = damaged(&|nodes| {
             let leaf = split(false, nodes);
             (nodes.split[leaf], nodes.masked[leaf]) = (true, false);
         });
-        assert!(more.starts_with("is damaged: ") && more.contains(" are split, and "), "{more}");
+        assert!(more.starts_with("is damaged: ") && more.contains(" splits "), "{more}");
         let both = damaged(&|nodes| nodes.masked[0] = true);
         assert_eq!(both, "is damaged: a node is masked and split");
         let side = damaged(&|nodes| {

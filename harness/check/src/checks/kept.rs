@@ -122,9 +122,7 @@ fn check_alone(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut 
     let Some(counted) = &manifest.components else { return };
     let (found, count) = (enclosed().count() as u64, counted.enclosed.count);
     if is_base && found != count {
-        result.report(format_args!(
-            "the manifest counts {count} enclosed components, and T0 has {found}"
-        ));
+        result.report(format_args!("the manifest has {count} enclosed components; T0 has {found}"));
     }
 }
 
@@ -157,9 +155,7 @@ fn seeds_in_flow(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
             None => "outside the root".to_owned(),
         };
         let at = terms.root.to_user(seed);
-        result.report(format_args!(
-            "seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"
-        ));
+        result.report(format_args!("seed {i} at {at:?} is {found}, not in a leaf that is {flow}"));
     }
 }
 
@@ -246,9 +242,9 @@ mod tests {
         assert_one(&seeded(&[at(4)]), "no seed lies in a component of flow, that of");
         assert_one(
             &seeded(&[at(0), at(3), at(5)]),
-            "seed 2 at [5.0, 5.0, 5.0] lies in the crossing leaf",
+            "seed 2 at [5.0, 5.0, 5.0] is in the crossing leaf",
         );
-        assert_one(&seeded(&[at(0), at(3), at(8)]), "lies outside the root");
+        assert_one(&seeded(&[at(0), at(3), at(8)]), "is outside the root");
     }
 
     #[test]
@@ -276,7 +272,7 @@ mod tests {
         assert_eq!(counted(Kind::Base, 2, 0, 1), NONE);
         assert_one(
             &counted(Kind::Base, 2, 0, 0),
-            "the manifest counts 0 enclosed components, and T0 has 1",
+            "the manifest has 0 enclosed components; T0 has 1",
         );
         assert_one(&counted(Kind::Base, 2, 1, 1), "leaves 1 inside components, and there are 0");
         assert_one(&counted(Kind::Final, 0, 0, 0), "leaves 0 outside components, and there are 2");

@@ -126,6 +126,9 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport> {
 
 /// The rule that decides which mesh is right, or why none does, from the first words that differ; `None` for a mesh that has no more leaves.
 fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, [x, y]: [Option<u64>; 2]) -> String {
+    if [a, b].iter().any(|mesh| mesh.manifest.lacks_inputs) {
+        return "none: a mesh states no inputs, from which all leaves follow: import both with --case".to_owned();
+    }
     if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }

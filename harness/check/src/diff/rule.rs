@@ -4,7 +4,7 @@
 //! other. Sides, and leaves that only one mesh has, are those of T0 of the case (sections 4, 5 and 7).
 
 use crate::why::Mesh;
-use crate::why::answer::{Answer, LOST};
+use crate::why::answer::{Answer, Cause, LOST};
 use contract::octant::Octant;
 use contract::tree::Kind;
 use contract::word::{self, Side};
@@ -61,12 +61,15 @@ fn absence(leaf: u64, has: &str, (lacks, mesh): Named) -> String {
 /// The rule for a leaf of a mesh that the other one has split.
 fn split(octant: &Octant, (coarse, _): Named, (fine, mesh): Named) -> String {
     let what = format!("{coarse} has the leaf {octant}, {fine} has split it");
-    let clauses = mesh.split(octant).clauses(&mesh.inputs.root);
-    if !clauses.is_empty() {
-        return format!("{what} {}: {fine} is right", clauses.join("; "));
+    let split = mesh.split(octant);
+    let clauses = split.clauses(&mesh.inputs.root);
+    let why = "a facet does (give the case file: --case)";
+    if let Some(Cause { is_crossed, facets, boxes, .. }) = &split.cause {
+        let is_label = *is_crossed && facets.is_empty() && boxes.is_empty();
+        let caveat = if is_label { format!(", if {why}") } else { String::new() };
+        return format!("{what} {}: {fine} is right{caveat}", clauses.join("; "));
     }
-    let unless = ", unless a facet does (give the case file: --case)";
-    let caveat = if mesh.knows_surface() { "" } else { unless };
+    let caveat = if mesh.knows_surface() { String::new() } else { format!(", unless {why}") };
     format!(
         "{what}: no facet, box, layer or balance requires the split, and refinement is minimal (sections 3 and 6): {coarse} \
          is right{caveat}"
@@ -138,13 +141,14 @@ mod tests {
                     text.starts_with("A has the leaf octant 1 (level 1), B has split it"),
                     "{text}"
                 );
-                assert!(text.contains(expected) && text.ends_with("B is right"), "{text}");
-                let end = if given {
-                    "section 3: facets that cross it: 0"
-                } else {
-                    "the surface crosses it"
+                assert!(text.contains(expected) && text.contains(": B is right"), "{text}");
+                let end = match given {
+                    true => "section 3: facets that cross it: 0: B is right",
+                    false => {
+                        "the surface crosses it: B is right, if a facet does (give the case file: --case)"
+                    }
                 };
-                assert!(text.contains(end), "{text}");
+                assert!(text.ends_with(end), "{text}");
             }
         }
         let case = case("keep = 'all'", &[FACET]);

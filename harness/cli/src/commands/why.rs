@@ -27,9 +27,11 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    let (has_inputs, shown) = (!disk.manifest.lacks_inputs, made.dir.display());
-    let why = format!("{shown} states no inputs, from which all leaves follow: give --case");
-    Failure::unless(has_inputs || case.is_some(), why)?;
+    let (of, shown) = (&disk.manifest, made.dir.display());
+    let why =
+        format!("{shown} states no inputs or no sides, from which answers follow: give --case");
+    let is_whole = !of.lacks_inputs && of.sides == contract::manifest::Sides::Known;
+    Failure::unless(is_whole || case.is_some(), why)?;
     let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{shown}: {why}"))?;
     print!("{}", Mesh::of(&disk.manifest, &tree, body.as_ref()).at(arguments.point)?);
