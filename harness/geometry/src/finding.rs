@@ -53,8 +53,8 @@ pub struct Place {
     pub at: [f64; 3],
     /// Openings: free width; thin walls and gaps: distance of the facets, which a twentieth of their area undercuts. In the user's units.
     pub width: Option<f64>,
-    /// Openings: whether the width is only an upper bound, because the rim is not flat.
-    pub is_at_most: bool,
+    /// Openings: whether the width is that of a projection, because the rim is not flat. What passes is narrower or somewhat wider.
+    pub is_projected: bool,
 }
 
 impl Place {
@@ -195,13 +195,13 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
             "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
         }
         Kind::Openings if input.cell.is_none() || finding.count_changing == 0 => format!(
-            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest may leak. {meaning}",
+            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest may leak. Where the rim is not flat, the width is that of a projection: harness leak measures what passes. {meaning}",
             number(width)
         ),
         // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
         Kind::Openings => format!(
             "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
-             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, the width is at most the number given: harness leak measures what passes. The rim of a sheet counts, too; a sheet has no inside.",
+             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, the width is that of a projection: harness leak measures what passes. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
         Kind::Duplicates if finding.count_changing == 0 => {
@@ -213,13 +213,14 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
         }
-        // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice.
-        Kind::ThinWalls | Kind::ThinGaps if width / 2.0 < finest => {
+        // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice; one across its
+        // diagonal has to be 4 / sqrt(3) cells wide.
+        Kind::ThinWalls | Kind::ThinGaps if width * 0.433 < finest => {
             format!("{meaning} A twentieth is too narrow for the finest cell of the root.")
         }
         Kind::ThinWalls | Kind::ThinGaps => format!(
             "{meaning} A spacing below {} would resolve all but the narrowest twentieth.",
-            number(width / 2.0)
+            number(width * 0.433)
         ),
         _ => meaning.into(),
     }
@@ -287,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_is_resolved_by_half_its_width_unless_that_is_below_the_finest_cell() {
+    fn a_sheet_is_resolved_however_it_is_turned_unless_that_takes_less_than_the_finest_cell() {
         for kind in [Kind::ThinWalls, Kind::ThinGaps] {
-            let narrow = of_width(kind, 1.99, 3, true);
+            let narrow = of_width(kind, 2.30, 3, true);
             assert!(narrow.ends_with("too narrow for the finest cell of the root."), "{narrow}");
-            let wide = of_width(kind, 2.0, 3, true);
+            let wide = of_width(kind, 2.4, 3, true);
             assert!(
                 wide.ends_with(
-                    " A spacing below 1.00 would resolve all but the narrowest twentieth."
+                    " A spacing below 1.04 would resolve all but the narrowest twentieth."
                 ),
                 "{wide}"
             );

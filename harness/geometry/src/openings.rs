@@ -70,8 +70,8 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
         facets.dedup();
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
         let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
-        let (width, is_at_most) = free_width(&ends);
-        (Place { width: Some(width), is_at_most, ..Place::new(facets, centre) }, extent)
+        let (width, is_projected) = free_width(&ends);
+        (Place { width: Some(width), is_projected, ..Place::new(facets, centre) }, extent)
     };
     labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }
@@ -143,7 +143,7 @@ const ROUNDS: usize = 4;
 /// Depth of a rim across its plane, in widths, from which on it is not flat. The rounding of vertices is less.
 const FLAT: f64 = 1e-3;
 
-/// The free width of a set of at least one point, or slightly more, and whether it is only an upper bound, as the points are not in one plane.
+/// The free width of a set of at least one point, or slightly more, and whether it is that of a projection, as the points are not in one plane.
 fn free_width(points: &[[f64; 3]]) -> (f64, bool) {
     let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
     let farthest = |offset: &dyn Fn(Point) -> Point| {
@@ -262,8 +262,8 @@ mod tests {
                 at.rotate_left(turn);
                 at
             }).collect();
-            let (found, is_at_most) = free_width(&points);
-            prop_assert!(!is_at_most);
+            let (found, is_projected) = free_width(&points);
+            prop_assert!(!is_projected);
             let expected = if least.is_finite() { least } else { 0.0 };
             let range = expected - 1e-9..=1.04 * expected + 1e-9;
             prop_assert!(range.contains(&found), "{} instead of {}", found, expected);

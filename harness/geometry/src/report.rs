@@ -136,9 +136,9 @@ impl Diagnosis {
         };
         let text = format!("\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0);
         writeln!(f, "{}", text.trim_end())?;
-        for Place { facets, facets_more, at, width, is_at_most } in places {
-            let most = if *is_at_most { "at most " } else { "" };
-            let width = width.map(|width| format!(": {most}{}", self.with_cells(" wide", width)));
+        for Place { facets, facets_more, at, width, is_projected } in places {
+            let about = if *is_projected { "about " } else { "" };
+            let width = width.map(|width| format!(": {about}{}", self.with_cells(" wide", width)));
             let dots = if *facets_more > 0 { ", ..." } else { "" };
             let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
             let at = point(self.root.rounded(*at));

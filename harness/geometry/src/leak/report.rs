@@ -182,7 +182,7 @@ fn describe(passage: &Passage, is_closed: bool, f: &mut fmt::Formatter<'_>) -> f
     let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
     let is_named = is_closed && !n.is_end && n.width_max <= n.cell_of_boxes;
     let end = if n.is_end { END } else { "" };
-    let closing = format!("          Spacings above {max} {CLOSE}\n");
+    let closing = format!("          Cells wider than {max} {CLOSE}\n");
     let closing = if is_named { &closing } else { "" };
     let listed: Vec<String> = n.facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
     let more = match n.facets.len().saturating_sub(FACETS_MAX) {
@@ -247,7 +247,7 @@ mod tests {
         let expected = "LEAK: free leaves join start and end; closed at spacing 2 (level 2), where facets cross the leaf of the start or the end\n\
             \nThe narrowest place of the widest path\n\
             width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
-            Spacings above 0.128 close this opening wherever the lattice lies, and finer ones may on this lattice; others have widths of their own (`harness geometry`).\n\
+            Cells wider than 0.128 close this opening wherever the lattice lies, and finer ones may on this lattice; others have widths of their own (`harness geometry`).\n\
             at        (0.5, 0, -1.25)\nfacets    3, 4\n";
         assert_eq!(leak(3, narrowest(3..5, 1, false)).to_string(), format!("{HEAD}{expected}"));
     }
@@ -269,17 +269,20 @@ mod tests {
         let verdict = "\nJOINED: start and end lie in one space, or one of them within the opening, at every spacing\n";
         assert!(text.contains(verdict), "{text}");
         let remark = format!("facets    3\n{END}");
-        assert!(text.contains(&remark) && !text.contains("Spacings above"), "{text}");
+        assert!(text.contains(&remark) && !text.contains("Cells wider than"), "{text}");
     }
 
     #[test]
     fn an_opening_that_no_spacing_closes_names_none() {
         let report = Report { closes: None, ..leak(3, narrowest(3..5, 1, false)) };
         let text = report.to_string();
-        assert!(text.contains(", at every spacing") && !text.contains("Spacings above"), "{text}");
+        assert!(
+            text.contains(", at every spacing") && !text.contains("Cells wider than"),
+            "{text}"
+        );
         // The cells of a box pass through the opening, although coarser ones close the path elsewhere.
         let narrowest = Narrowest { cell_of_boxes: 0.1, ..narrowest(3..5, 1, false) };
-        assert!(!leak(3, narrowest).to_string().contains("Spacings above"));
+        assert!(!leak(3, narrowest).to_string().contains("Cells wider than"));
     }
 
     #[test]

@@ -186,8 +186,8 @@ fn the_width_of_a_slot_around_a_pipe_is_an_upper_bound() {
     let facets: Vec<Facet> = (0..32).flat_map(|i| side(i).chain(lids(i))).collect();
     let found = diagnosis(facets, Some(0.05));
     let place = first(&found, Kind::Openings);
-    assert!(place.is_at_most && place.width.unwrap() > 0.5, "{place:?}");
-    assert!(found.to_string().contains("): at most "), "{found}");
+    assert!(place.is_projected && place.width.unwrap() > 0.5, "{place:?}");
+    assert!(found.to_string().contains("): about "), "{found}");
 }
 
 /// A case with these facets in a root that all of them lie in.

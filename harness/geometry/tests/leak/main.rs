@@ -221,7 +221,7 @@ fn an_opening_in_a_finer_box_is_measured_and_no_spacing_closes_it() {
     for start in [[0.0; 3], [0.13, -0.21, 0.9]] {
         let report = in_box(&body.facets, start, around, 0.0078125);
         assert!(report.is_leak && report.closes.is_none(), "{report}");
-        assert!(!report.to_string().contains("Spacings above"), "{report}");
+        assert!(!report.to_string().contains("Cells wider than"), "{report}");
         assert_describes(&report, &body, "a box");
     }
 }
