@@ -27,7 +27,7 @@ use mesher::input::quantise::Quantised;
 use mesher::output::leaves;
 use mesher::output::report::{Report, grouped};
 use mesher::output::stream::total;
-use mesher::partition::area;
+use mesher::partition::{Division, area};
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
 use pilot::{Amounts, Pilot, boxed_in};
@@ -54,6 +54,8 @@ pub struct Plan {
     pub ranks: usize,
     /// The pilot runs, coarsest first.
     pub pilots: Vec<PilotEntry>,
+    /// Whether one of the last two is without the seeds, as they lie in its crossing cells.
+    pub is_without_seeds: bool,
     /// Leaves of the mesh.
     pub cells: u64,
     /// CPU time over all ranks, in seconds, at the rate of the pilot runs.
@@ -103,8 +105,8 @@ struct Problem<'a> {
     comm: &'a dyn Comm,
 }
 
-/// Makes a pilot run that is coarser by some levels, and returns the amounts of this rank.
-type Run<'a> = &'a mut dyn FnMut(Level) -> Result<Amounts, Error>;
+/// Makes a pilot run that is coarser by some levels, and returns the amounts of this rank, and whether it is without the seeds.
+type Run<'a> = &'a mut dyn FnMut(Level) -> Result<(Amounts, bool), Error>;
 
 /// Meshes a case, if it fits into memory or the user insists. Collective.
 ///
@@ -131,10 +133,11 @@ pub fn plan(case: &Case, job: &mut Job) -> Result<Plan, Error> {
     uncounted(job.comm, || Problem::new(&quantised, job).plan(run))
 }
 
-/// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
-fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<Amounts, Error> {
-    let options = Options { check: false, out: None, strict: false, ..job.options.clone() };
-    let run = |rules: Rules| {
+/// A pilot run, coarser by `shift` levels: what this rank needs for it, and whether it is without the seeds. Collective.
+fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<(Amounts, bool), Error> {
+    let run = |rules: Rules, division: Division| {
+        let options = job.options.clone();
+        let options = Options { division, check: false, out: None, strict: false, ..options };
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, job.comm, &mut record);
         let facets = &quantised.facets[..];
@@ -144,10 +147,13 @@ fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<Amounts, Erro
         Ok(pilot::amounts(&mesh, total(&counts), job, &quantised.rules.boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
-    match run(rules.clone()) {
-        // A seed may lie in a coarser cell that crosses.
-        Err(_) if shift > 0 && !rules.seeds.is_empty() => run(Rules { seeds: Vec::new(), ..rules }),
-        result => result,
+    match run(rules.clone(), job.options.division) {
+        // A seed may lie in a coarser cell that crosses, and METIS may have too few base leaves for the ranks.
+        Err(_) if shift > 0 => {
+            let amounts = run(Rules { seeds: Vec::new(), ..rules.clone() }, Division::default());
+            Ok((amounts?, !rules.seeds.is_empty()))
+        }
+        result => result.map(|amounts| (amounts, false)),
     }
 }
 
@@ -190,17 +196,17 @@ impl<'a> Problem<'a> {
     fn plan(&self, run: Run) -> Result<Plan, Error> {
         let coarsest = self.rules.level_deepest();
         let [rough, rough_boxed] = self.rough;
-        let rough_at =
-            |shift: Level| rough / 4f64.powi(shift as i32) + rough_boxed / 8f64.powi(shift as i32);
+        let rough_at = |s: Level| rough / 4f64.powi(s as i32) + rough_boxed / 8f64.powi(s as i32);
         // Without doubt that the run does not fit, its pilots are short.
         let thick = (f64::from(self.rules.layer_cells_min) / 4.0).clamp(1.0, 16.0);
         let doubted = if self.used_rough() > USED_UNDOUBTED * thick { 0.0 } else { rough_at(0) };
         let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT);
         let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
         let mut pilots = Vec::new();
-        let mut coarser = None;
+        let (mut coarser, mut before) = (None, false);
         for shift in (0..=first).rev() {
-            let ranks = Ranks::gather(self.comm, run(shift)?);
+            let (amounts, is_without_seeds) = run(shift)?;
+            let ranks = Ranks::gather(self.comm, amounts);
             let amounts = ranks.total();
             pilots.push(PilotEntry {
                 spacing_factor: 2f64.powi(shift as i32),
@@ -209,9 +215,11 @@ impl<'a> Problem<'a> {
             });
             let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed };
             if shift == 0 || coarser.is_some() && pilot.at(shift - shift.min(1)).cells > cells_max {
-                return Ok(self.plan_of(pilots, &pilot, &ranks));
+                let plan = self.plan_of(pilots, &pilot, &ranks);
+                let is_without_seeds = is_without_seeds || before && shift > 0;
+                return Ok(Plan { is_without_seeds, ..plan });
             }
-            coarser = Some(amounts);
+            (coarser, before) = (Some(amounts), is_without_seeds);
         }
         unreachable!("the last pilot is the run itself")
     }
@@ -225,6 +233,7 @@ impl<'a> Problem<'a> {
         let [before, written] = self.times_s;
         let plan = Plan {
             schema: "octree-mesher-plan/2",
+            is_without_seeds: false,
             ranks: self.comm.size(),
             pilots,
             cells: cells as u64,
@@ -258,19 +267,23 @@ impl Plan {
 
     /// The error that refuses a run that does not fit.
     pub fn refusal(&self) -> Error {
-        let Tightest { limit, left_bytes, needed_bytes } =
-            self.tightest.expect("a limit that does not suffice");
+        let Tightest { limit, left_bytes, needed_bytes } = self.tightest.expect("a limit too low");
         let fitting = match self.spacing_factor_fits {
             Some(factor) => format!("multiply all spacings by {factor}, which fits"),
             None => "no spacing of this case fits".into(),
         };
+        let (cells, [needed, left]) = (self.about(), [needed_bytes, left_bytes].map(bytes));
+        let doubt = self.doubt();
         Error::memory(format!(
-            "the mesh would have {} cells and need {} of memory, but the {limit} has {} left: {fitting}, use more machines, or try with \
-             --force",
-            self.about(),
-            bytes(needed_bytes),
-            bytes(left_bytes),
+            "the mesh would have {cells} cells and need {needed} of memory, but the {limit} has {left} left: {fitting}, use more machines, or \
+             try with --force{doubt}"
         ))
+    }
+
+    /// What makes the estimate unsafe, if anything does.
+    fn doubt(&self) -> &'static str {
+        let why = "; seeds lie in crossing cells of a pilot run, whose sides are by rays, so this may be far off";
+        if self.is_without_seeds { why } else { "" }
     }
 
     /// The number of cells, to the precision of its source.
@@ -284,7 +297,7 @@ impl Plan {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "cells          {}", self.about())?;
+        writeln!(f, "cells          {}{}", self.about(), self.doubt())?;
         writeln!(f, "time           {:.2} s of CPU time over all ranks", self.time_cpu_s)?;
         let peaks = &self.memory_peak_bytes;
         let [all, most] = [peaks.iter().sum(), peaks.iter().copied().max().unwrap_or(0)].map(bytes);

@@ -36,7 +36,7 @@ fn planned(cells: f64, bytes: f64) -> (Plan, Vec<Level>) {
     let mut asked = Vec::new();
     let mut pilot = |shift| {
         asked.push(shift);
-        Ok(amounts(cells, bytes, shift))
+        Ok((amounts(cells, bytes, shift), false))
     };
     let plan = with_problem(13, |problem| problem.plan(&mut pilot));
     (plan.expect("the pilots succeed"), asked)
@@ -125,16 +125,17 @@ fn only_runs_that_may_not_fit_are_planned_and_refused() {
         let mut pilots = 0;
         let few = &mut |shift| {
             pilots += 1;
-            Ok(amounts(ROUGH, 1.0, shift))
+            Ok((amounts(ROUGH, 1.0, shift), false))
         };
         assert_eq!(problem.check(few), Ok(()));
         assert!(pilots > 1);
-        let many = &mut |shift| Ok(amounts(1e12, 1e18, shift));
+        let many = &mut |shift| Ok((amounts(1e12, 1e18, shift), false));
         assert_eq!(problem.check(many).unwrap_err().exit_code, 71);
     });
     // A small case is meshed.
     let plan =
-        with_problem(8, |problem| problem.plan(&mut |shift| Ok(amounts(9.0, 1.0, shift)))).unwrap();
+        with_problem(8, |problem| problem.plan(&mut |shift| Ok((amounts(9.0, 1.0, shift), false))))
+            .unwrap();
     assert_eq!((plan.cells, plan.pilots.len(), plan.pilots[0].spacing_factor), (9, 1, 1.0));
 }
 
@@ -145,7 +146,7 @@ fn pilots_of_runs_that_cannot_fit_are_short() {
         let pilot = &mut |shift| {
             let amounts = amounts(problem.rough[0], 1e18, shift);
             finest = amounts.cells;
-            Ok(amounts)
+            Ok((amounts, false))
         };
         problem.plan(pilot).unwrap();
         assert!(problem.used_rough() > USED_UNDOUBTED && finest <= CELLS_MOMENT);
@@ -162,7 +163,7 @@ fn pilots_of_thick_layers_are_finer_because_their_cells_take_less() {
             let pilot = &mut |shift| {
                 let amounts = amounts(problem.rough[0], 1.0, shift);
                 finest = amounts.cells;
-                Ok(amounts)
+                Ok((amounts, false))
             };
             Problem { rules: &rules, ..*problem }.plan(pilot).unwrap();
             finest
@@ -179,7 +180,7 @@ fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, comm, &mut record);
         let quantised = mesher::quantised(&case(), job).unwrap();
-        let run = |shift| pilot(&quantised, shift, job).unwrap();
+        let run = |shift| pilot(&quantised, shift, job).unwrap().0;
         ([2, 1, 0].map(run), boxed_in(&quantised.rules.boxes, 0, 0))
     };
     let all = match ranks {
@@ -225,7 +226,8 @@ fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
         pilot(&mesher::quantised(&case, job)?, shift, job)
     };
     // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
-    assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
+    let [without, with] = [0.53, 0.7].map(|x| run(x, 3).unwrap().1);
+    assert!(without && !with);
     assert_eq!(run(0.5, 0).unwrap_err().exit_code, 2);
 }
 
@@ -247,6 +249,7 @@ fn plan_for_people() -> Plan {
         schema: "",
         ranks: 2,
         pilots: vec![pilot(4.0), pilot(2.0)],
+        is_without_seeds: false,
         cells: 1_234_567,
         time_cpu_s: 12.6,
         memory_peak_bytes: vec![2_000_000, 3_500_000],
@@ -281,6 +284,10 @@ fn a_refusal_names_the_limit_and_the_factor_that_fits() {
     let refused = "the mesh would have about 1.2e6 cells and need 5.0 MB of memory, but the machine has 900 MB left: \
                    multiply all spacings by 4, which fits, use more machines, or try with --force";
     assert_eq!(plan.refusal(), Error::memory(refused));
+    plan.is_without_seeds = true;
+    let doubt = "; seeds lie in crossing cells of a pilot run, whose sides are by rays, so this may be far off";
+    assert_eq!(plan.refusal(), Error::memory(format!("{refused}{doubt}")));
+    assert!(plan.to_string().starts_with(&format!("cells          about 1.2e6{doubt}\n")));
     plan.spacing_factor_fits = None;
     assert!(plan.refusal().to_string().contains("left: no spacing of this case fits, use more"));
 }

@@ -169,17 +169,14 @@ pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> R
 /// # Errors
 /// If the weights contradict the paper's.
 pub fn options(args: &Args) -> Result<Options, Error> {
+    let why = "--preset paper gives each base leaf weight 1: leave out --weights";
     let weights = match (args.partitioner, args.weights) {
         (Partitioner::Paper, None | Some(Weights::Unit)) => Weights::Unit,
-        (Partitioner::Paper, Some(_)) => {
-            let why = "--preset paper gives each base leaf weight 1: leave out --weights";
-            return Err(Error::input(why));
-        }
+        (Partitioner::Paper, Some(_)) => return Err(Error::input(why)),
         (_, weights) => weights.unwrap_or_default(),
     };
     let case_name = is_case_file(args).then(|| args.input().display().to_string());
-    let has = |files| args.write.contains(&files);
-    let (words, tree) = (has(Files::Words), has(Files::Htg));
+    let [words, tree] = [Files::Words, Files::Htg].map(|files| args.write.contains(&files));
     Ok(Options {
         division: Division { partitioner: args.partitioner, weights, level_base: args.level_base },
         ungraded: args.ungraded,
@@ -212,8 +209,6 @@ pub fn case(args: &Args, comm: &dyn Comm) -> Result<Case, Error> {
         return case_file::parse(&text, args.input());
     }
     let case = args.keys.clone().and_then(|k| k.case_of(Source::Stl(args.input().to_owned())));
-    case.ok_or_else(|| {
-        let why = "is read as an STL file: give --spacing-min, or a case file (.toml)";
-        Error::input(format!("{input} {why}"))
-    })
+    let why = "is read as an STL file: give --spacing-min, or a case file (.toml)";
+    case.ok_or_else(|| Error::input(format!("{input} {why}")))
 }

@@ -113,7 +113,8 @@ fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.
 fn identity(path: &Path) -> Result<impl Hash + PartialEq + use<>, ErrorKind> {
     let m = path.metadata().map_err(|e| e.kind())?;
-    Ok((m.ino(), m.len(), m.mtime(), m.mtime_nsec()))
+    // Copies may be given the same time of modification, but not of the change of their status.
+    Ok((m.ino(), m.len(), m.mtime(), m.mtime_nsec(), m.ctime(), m.ctime_nsec()))
 }
 
 /// The file's bytes, or why it cannot be read.

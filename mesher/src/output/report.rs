@@ -121,14 +121,10 @@ impl Report {
     /// If an invariant at the head of this file is violated.
     pub fn check_invariants(&self) {
         let (all, mesh) = (self.cells, &self.mesh);
-        let sums = [
-            ("level", mesh.leaves_by_level.iter().sum::<u64>()),
-            ("side", mesh.leaves_by_side.values().sum()),
-            ("rank", self.counters["leaves"].iter().sum()),
-        ];
-        for (by, sum) in sums {
-            assert_eq!(sum, all, "leaves by {by} must add up to all leaves");
-        }
+        let check = |by: &str, sum: u64| assert_eq!(sum, all, "leaves by {by} must add up to all");
+        check("level", mesh.leaves_by_level.iter().sum());
+        check("side", mesh.leaves_by_side.values().sum());
+        check("rank", self.counters["leaves"].iter().sum());
         let heaviest = self.counters["base_leaf_cells_max"].iter().zip(&self.counters["leaves"]);
         for (rank, (heaviest, leaves)) in heaviest.enumerate() {
             assert!(heaviest <= leaves, "rank {rank}: a base leaf of {heaviest} of all {leaves}");
