@@ -72,8 +72,7 @@ fn findings(
     // The reference makes no large mesh, for instance.
     let is_gone = |old: &Check| report.checks.iter().all(|new| key(new) != key(old));
     let is_lost = |old: &&Check| is_of_mesh(old) && count(old).is_some() && is_gone(old);
-    let lost = baseline.iter().flat_map(|old| &old.checks).filter(is_lost);
-    let lost: Vec<String> = lost.map(key).collect();
+    let lost: Vec<_> = baseline.iter().flat_map(|of| &of.checks).filter(is_lost).map(key).collect();
     if !lost.is_empty() && all.iter().all(|finding| finding.verdict < Verdict::Missing) {
         let why = format!("only the baseline's mesh has these checks: {}", lost.join(", "));
         all.push(GateFinding::noted(case, CHECKS, Verdict::Missing, why));

@@ -245,7 +245,8 @@ impl Session<'_> {
                     Ok(finest) => finest.unwrap_or(base.spacing_min),
                     // The search would fail for the other setups, too.
                     Err(failure) => {
-                        let why = format!("no spacing is known for its cells: {}", failure.why);
+                        let (of, why) = (cells.unwrap_or(0.0), &failure.why);
+                        let why = format!("no spacing is known for {of:.1e} cells: {why}");
                         let setup = Setup { spacing_min: base.spacing_min, ..setup };
                         return self.failed(setup, Failure { why, ..failure }).map(|()| points);
                     }
