@@ -34,11 +34,6 @@ impl Chunked {
         Self { len, chunk_len, chunks: vec![None; chunks] }
     }
 
-    /// Bytes that encode the length of a chunk: as few as suffice, which the library verifies.
-    pub(crate) fn dim_bytes(&self) -> usize {
-        1 + self.chunk_len.ilog2() as usize / 8
-    }
-
     /// Bytes that encode the compressed size of a chunk in the table: the library's rule.
     pub(crate) fn size_bytes(&self) -> usize {
         1 + (self.chunk_len.ilog2() as usize + 8) / 8

@@ -149,7 +149,8 @@ impl Metadata {
         add_message(&mut header, message::DATASPACE, &simple(array.len));
         add_message(&mut header, message::DATATYPE, datatype::BYTE);
         add_message(&mut header, message::FILL_VALUE, &ALLOCATED_BY_CHUNK);
-        let bytes = array.dim_bytes();
+        // As few as encode the length of a chunk, which the library verifies.
+        let bytes = 1 + array.chunk_len.ilog2() as usize / 8;
         let mut layout = vec![LAYOUT_VERSION, LAYOUT_CHUNKED, 0, 2, bytes as u8];
         [array.chunk_len, 1].iter().for_each(|dim| layout.extend(&dim.to_le_bytes()[..bytes]));
         layout.extend([INDEX_FIXED_ARRAY, PAGE_BITS].into_iter().chain(table.to_le_bytes()));

@@ -13,4 +13,4 @@ mod session;
 
 pub use file::Study;
 pub use judge::judged;
-pub use session::{Outcome, SessionOptions, measure};
+pub use session::{NO_MPI, Outcome, SessionOptions, measure};

@@ -47,6 +47,8 @@ pub struct SessionOptions {
     pub version: &'static str,
 }
 
+/// Why a row on MPI is left out on request.
+pub const NO_MPI: &str = "--no-mpi was given";
 /// Why a row on MPI is left out without a launcher.
 const NO_LAUNCHER: &str = "the launcher is missing";
 
@@ -217,7 +219,7 @@ impl Session<'_> {
     fn mpi_left_out(&self) -> Option<&'static str> {
         let SessionOptions { no_mpi, launcher, .. } = self.options;
         let is_missing = !launcher.is_found();
-        if *no_mpi { Some("--no-mpi was given") } else { is_missing.then_some(NO_LAUNCHER) }
+        if *no_mpi { Some(NO_MPI) } else { is_missing.then_some(NO_LAUNCHER) }
     }
 
     /// Plans the runs of a series at one size.

@@ -5,7 +5,7 @@ use bench::experiments::entry::{Entry, Line, NoResult, Setup, TARGETS};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
 use bench::study::judge::{Judged, Verdict};
-use bench::study::{self, Outcome, SessionOptions, Study};
+use bench::study::{self, NO_MPI, Outcome, SessionOptions, Study};
 use clap::Args;
 use contract::failure::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result, exit_first,
@@ -226,7 +226,7 @@ fn is_result(line: &Line) -> bool {
 }
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program
-/// in an experiment on a case.
+/// in an experiment on a case, or a target has no value, unless the user left its runs out.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let has_failed = lines.iter().zip(1..).any(|(line, after)| {
         let is_repeated = |later: &Line| is_result(later) && later.setup() == line.setup();
@@ -244,8 +244,13 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
         return EXIT_FAILED;
     }
     let (without, has_series) = (left.find(|of| !runs.contains(of)), !study.series.is_empty());
+    let is_open = |r: &Judged| {
+        let is_target = r.row.at_least.or(r.row.at_most).is_some();
+        is_target && r.measured.is_none() && r.why != NO_MPI
+    };
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
+        _ if rows.iter().any(is_open) => "a target has no value, and its row says why",
         _ if has_series && runs.is_empty() => "no series was measured: request fewer cells",
         Some(of) => &format!("nothing was measured of {}: the report says why", of.join(", ")),
         None => return EXIT_HOLDS,
@@ -291,6 +296,13 @@ mod tests {
         let both = read(&format!("{series}{rows}")).unwrap();
         let left = unjudged(&both.row[0], false, "no launcher".into());
         assert_eq!(code(&both, &[left], &all), EXIT_MISSING);
+        // Nor does a row with a value for a target without one, unless the user left it out.
+        let target = read(&rows.replace("'seconds'", "'seconds'\nat_most = 9")).unwrap();
+        let row = |why: &str| unjudged(&target.row[0], false, why.into());
+        let met = Judged { measured: Some((1.0, "measured")), ..row("") };
+        for (why, expected) in [("not in the record", EXIT_MISSING), (NO_MPI, EXIT_HOLDS)] {
+            assert_eq!(code(&target, &[met.clone(), row(why)], &[]), expected, "{why}");
+        }
     }
 
     #[test]

@@ -170,19 +170,15 @@ impl Search<'_> {
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
             if bound.is_none() && searches >= SEARCHES_MAX && way.passing() > 0.0 {
                 bound = Some(way.bound);
-                self.keep_near(&way, &cells);
+                // Of the cells that may be narrow, only those of the path and near its narrow places are measured further.
+                let (near, wanted) = (way.near(), way.wanted());
+                for (i, cell) in (0..).zip(&mut self.space.cells) {
+                    cell.is_open &= cell.shown() >= wanted || near(cell) || cells.contains(&i);
+                }
             }
             if searches >= 10 * SEARCHES_MAX && way.passing() > 0.0 || !self.divide(&way) {
                 return Ok(Way { bound: bound.unwrap_or(way.bound), ..way });
             }
-        }
-    }
-
-    /// Closes all cells that may be narrow, except those of a path and near its narrow places, so that only these are measured further.
-    fn keep_near(&mut self, way: &Way, cells: &[u32]) {
-        let near = way.near();
-        for (i, cell) in (0..).zip(&mut self.space.cells) {
-            cell.is_open &= cell.shown() >= way.wanted() || near(cell) || cells.contains(&i);
         }
     }
 
