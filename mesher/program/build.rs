@@ -14,8 +14,10 @@ fn commit() -> Option<String> {
     // A commit or a checkout appends to this file. Where git keeps none, every build runs this again.
     let log = git(&["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])?;
     println!("cargo::rerun-if-changed={log}");
-    // Uncommitted changes of the mesher, or of the harness, make the work tree dirty.
-    println!("cargo::rerun-if-changed=..");
+    // Uncommitted changes of what the mesher or the harness is made of make the work tree dirty.
+    for part in ["Cargo.toml", "Cargo.lock", "mesher", "geometries", "harness", "reference"] {
+        println!("cargo::rerun-if-changed=../../{part}");
+    }
     git(&["describe", "--always", "--dirty", "--abbrev=12"])
 }
 

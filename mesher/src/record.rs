@@ -112,11 +112,11 @@ impl Recorder {
     /// Also writes the name of the current phase to a file from now on.
     ///
     /// # Errors
-    /// If the file is an input of this run.
+    /// If the file is an input of this run or cannot be written.
     pub fn keep_status(&mut self, path: PathBuf) -> io::Result<()> {
         files::register_output(&path)?;
+        std::fs::write(&path, "start\n")?;
         self.status = Some(path);
-        self.report_status("start");
         Ok(())
     }
 

@@ -15,6 +15,7 @@ use std::io::{self, Cursor, Read, Write, stderr};
 use std::mem::MaybeUninit;
 use std::os::unix::net::UnixStream;
 use std::ptr::null;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Barrier, Mutex, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
@@ -39,6 +40,9 @@ const WAITING: u8 = 0;
 /// Reaches the thread that handles signals: it takes part in the barrier when it starts, and when it reads [WAITING].
 static HANDLER: OnceLock<(UnixStream, Barrier)> = OnceLock::new();
 
+/// Whether a signal was ignored, as the outcome of a run was decided.
+static IS_IGNORED: AtomicBool = AtomicBool::new(false);
+
 /// Time for threads of MPI or of other ranks to take a signal after the process was stopped at a point.
 const TAKING: Duration = Duration::from_millis(300);
 
@@ -60,6 +64,8 @@ pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
                 barrier.wait();
                 continue;
             }
+            // Before the state is asked for, so that a run which begins afterwards knows of it.
+            IS_IGNORED.store(true, Relaxed);
             if !(abandon(true) && is_first) {
                 print(message);
                 sleep(linger);
@@ -88,10 +94,14 @@ pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
     Ok(SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)))
 }
 
-/// Notes that another run begins, whose outcome is open and whose files are others: for a program that stays for several runs.
+/// Notes that another run begins, whose outcome is open and whose files are others: for a program that stays for several runs. Ends the
+/// process if a signal was ignored at the end of the last one.
 pub fn begin() {
     forget();
     decide(false);
+    if IS_IGNORED.load(Relaxed) {
+        exit_at_once(INTERRUPTED);
+    }
 }
 
 /// Stops the process, as SIGSTOP does, where it first reaches the point that the environment variable `STOP_AT` names. Tests then send

@@ -72,16 +72,14 @@ pub fn locked<T>(body: impl FnOnce() -> T) -> T {
 }
 
 impl Unfinished {
-    /// Begins output. Also returns what `begin` does beside it.
+    /// Begins output. Also returns what `f` does beside it.
     ///
     /// # Errors
-    /// With whatever `begin` returns; then it leaves nothing.
-    pub fn begin<T>(
-        begin: impl FnOnce() -> Result<(Output, T), Errno>,
-    ) -> Result<(Self, T), Errno> {
+    /// With whatever `f` returns; then it leaves nothing.
+    pub fn begin<T>(f: impl FnOnce() -> Result<(Output, T), Errno>) -> Result<(Self, T), Errno> {
         let outputs = &mut lock_to_work().outputs;
         let free = outputs.iter().position(Option::is_none).ok_or(Errno::MFILE)?;
-        let (output, beside) = begin()?;
+        let (output, beside) = f()?;
         outputs[free] = Some(output);
         Ok((Self(free), beside))
     }

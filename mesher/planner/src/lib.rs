@@ -147,14 +147,16 @@ fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<(Amounts, boo
         Ok(pilot::amounts(&mesh, total(&counts), job, &quantised.rules.boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
-    match run(rules.clone(), job.options.division) {
-        // A seed may lie in a coarser cell that crosses, and METIS may have too few base leaves for the ranks.
-        Err(_) if shift > 0 => {
-            let amounts = run(Rules { seeds: Vec::new(), ..rules.clone() }, Division::default());
-            Ok((amounts?, !rules.seeds.is_empty()))
-        }
-        result => result.map(|amounts| (amounts, false)),
+    let mut result = run(rules.clone(), job.options.division);
+    // METIS may have too few base leaves for the ranks, and a seed may lie in a coarser cell that crosses.
+    if result.is_err() && shift > 0 && job.options.division != Division::default() {
+        result = run(rules.clone(), Division::default());
     }
+    let is_unseeded = result.is_err() && shift > 0 && !rules.seeds.is_empty();
+    if is_unseeded {
+        result = run(Rules { seeds: Vec::new(), ..rules }, Division::default());
+    }
+    result.map(|amounts| (amounts, is_unseeded))
 }
 
 impl<'a> Problem<'a> {

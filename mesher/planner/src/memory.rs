@@ -8,9 +8,13 @@ use ranks::{Comm, gather};
 use rustix::process::{Resource, getrlimit};
 use serde::Serialize;
 use std::collections::HashMap;
-use std::fs::read_to_string;
+use std::fs::{metadata, read_to_string};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+
+/// Where the system shows the control groups of all processes, or of a container.
+const CONTROL_GROUPS: &str = "/sys/fs/cgroup";
 
 /// Bytes of the holes that sets leave which grow in the heap: this part of the sets, as long as they are smaller than the blocks that get
 /// mappings of their own; and bytes at most.
@@ -37,8 +41,8 @@ struct Rank {
     control_group: f64,
     /// What the machine has available for all processes.
     machine: f64,
-    /// A digest that machines differ in.
-    node: u64,
+    /// Digests that machines differ in, and the control groups which processes see as the root of all.
+    shared: [u64; 2],
 }
 
 /// The limit that a run comes closest to.
@@ -76,15 +80,17 @@ fn control_group(groups: &str, mount: &Path) -> f64 {
     groups.lines().filter_map(of_line).fold(f64::INFINITY, f64::min)
 }
 
-/// What one group leaves: version 2 or 1. The cache of files gives way to other memory.
+/// What one group leaves: version 1 or 2. The cache of files gives way to other memory, but for memory that processes share and files that
+/// are in memory alone, which both versions count as cache.
 fn left(folder: &Path) -> f64 {
     let text = |name: &str| read_to_string(folder.join(name)).unwrap_or_default();
     let number =
         |names: [&str; 2]| names.iter().find_map(|name| text(name).trim().parse::<f64>().ok());
     let stat = text("memory.stat");
-    let cache = |name: &str| stat.lines().find_map(|l| l.strip_prefix(name)?.parse::<f64>().ok());
+    let of_line = |name: &str| stat.lines().find_map(|l| l.strip_prefix(name)?.parse::<f64>().ok());
+    let bytes = |names: [&str; 2]| names.into_iter().find_map(of_line).unwrap_or(0.0);
     let used = number(["memory.current", "memory.usage_in_bytes"]).unwrap_or(0.0);
-    let cached = cache("file ").or_else(|| cache("total_cache ")).unwrap_or(0.0);
+    let cached = bytes(["total_cache ", "file "]) - bytes(["total_shmem ", "shmem "]);
     // "max" in version 2 and almost 2^63 in version 1 mean no limit.
     let max = number(["memory.max", "memory.limit_in_bytes"]).filter(|max| *max < 2f64.powi(60));
     max.map_or(f64::INFINITY, |max| (max - (used - cached).max(0.0)).max(0.0))
@@ -95,15 +101,18 @@ impl Ranks {
     pub fn gather(comm: &dyn Comm, amounts: Amounts) -> Self {
         let text = |path: &str| read_to_string(path).unwrap_or_default();
         let boot = text("/proc/sys/kernel/random/boot_id");
+        let digest = |group| BuildHasherDefault::<DefaultHasher>::new().hash_one((&boot, group));
+        // The root that a container sees is the group of the container.
+        let group = metadata(CONTROL_GROUPS).map_or((1, 1), |root| (root.dev(), root.ino()));
         let available = stated_bytes("/proc/meminfo", "MemAvailable:");
         let mine = Rank {
             amounts,
             resident: stated_bytes("/proc/self/status", "VmRSS:").unwrap_or(0) as f64,
             peak: peak_rss_bytes() as f64,
             address_space: address_space_left(),
-            control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
+            control_group: control_group(&text("/proc/self/cgroup"), Path::new(CONTROL_GROUPS)),
             machine: available.map_or(f64::INFINITY, |bytes| bytes as f64),
-            node: BuildHasherDefault::<DefaultHasher>::new().hash_one(boot),
+            shared: [(0, 0), group].map(digest),
         };
         Self { all: gather(comm, &[mine]), in_process: comm.ranks_in_process() as f64 }
     }
@@ -134,14 +143,14 @@ impl Ranks {
 
     /// The limit that the ranks come closest to, if each takes as many bytes as given beyond what it has.
     pub fn tightest(&self, more: &[f64]) -> Option<Tightest> {
-        let (mut nodes, mut all) = (HashMap::new(), Vec::new());
+        let (mut needs, mut all) = (HashMap::new(), Vec::new());
         for (rank, own) in self.all.iter().zip(more) {
-            *nodes.entry(rank.node).or_insert(0.0) += own;
+            rank.shared.iter().for_each(|by| *needs.entry(by).or_insert(0.0) += own);
         }
         for (rank, own) in self.all.iter().zip(more) {
             all.push(("address space", rank.address_space, own * self.in_process));
-            all.push(("control group", rank.control_group, nodes[&rank.node]));
-            all.push(("machine", rank.machine, nodes[&rank.node]));
+            all.push(("control group", rank.control_group, needs[&rank.shared[1]]));
+            all.push(("machine", rank.machine, needs[&rank.shared[0]]));
         }
         let part = |(_, left, needed): &(&str, f64, f64)| needed / left.max(1.0);
         let limited = all.into_iter().filter(|(_, left, _)| left.is_finite());
@@ -158,7 +167,8 @@ mod tests {
     fn rank(node: u64, address_space: f64, machine: f64) -> Rank {
         let amounts = Amounts { bytes_sides: 10.0, ..Amounts::default() };
         let control_group = f64::INFINITY;
-        Rank { amounts, resident: 50.0, peak: 70.0, address_space, control_group, machine, node }
+        let shared = [node, 10 + node];
+        Rank { amounts, resident: 50.0, peak: 70.0, address_space, control_group, machine, shared }
     }
 
     #[test]
@@ -208,7 +218,8 @@ mod tests {
             assert_eq!(found, [0, 1, 2].map(amounts));
             assert_eq!(ranks.total().cells_boxed_deleted, 303.0);
             for rank in &ranks.all {
-                assert_eq!(rank.node, ranks.all[0].node);
+                assert_eq!(rank.shared, ranks.all[0].shared);
+                assert_ne!(rank.shared[0], rank.shared[1]);
                 assert!([rank.resident, rank.peak].iter().all(|b| (1e5..1e11).contains(b)));
             }
         });
@@ -221,6 +232,22 @@ mod tests {
         let tightest = Ranks { all: vec![one], in_process: 1.0 }.tightest(&[2.0]).unwrap();
         let expected = Tightest { limit: "control group", left_bytes: 0, needed_bytes: 2 };
         assert_eq!(tightest, expected);
+    }
+
+    #[test]
+    fn containers_of_one_machine_have_limits_of_their_own() {
+        let of_container = |group: u64| {
+            let shared = [1, group];
+            Rank { control_group: 4.0, shared, ..rank(1, 900.0, 100.0) }
+        };
+        let tightest = |groups: [u64; 2]| {
+            let all = groups.map(of_container).to_vec();
+            let Tightest { limit, needed_bytes, .. } =
+                Ranks { all, in_process: 1.0 }.tightest(&[3.0, 3.0]).unwrap();
+            (limit, needed_bytes)
+        };
+        assert_eq!(tightest([7, 8]), ("control group", 3));
+        assert_eq!(tightest([7, 7]), ("control group", 6));
     }
 
     #[test]
@@ -238,19 +265,19 @@ mod tests {
             ("memory.max", "max\n"),
             ("a/memory.max", "1000\n"),
             ("a/memory.current", "700\n"),
-            ("a/memory.stat", "anon 100\nfile 600\n"),
+            ("a/memory.stat", "anon 100\nfile 600\nshmem 150\n"),
             ("a/b/memory.max", "5000\n"),
         ];
-        assert_eq!(left("0::/a/b\n", &two), 900.0);
+        assert_eq!(left("0::/a/b\n", &two), 750.0);
         assert_eq!(left("0::/of/the/host\n", &two), f64::INFINITY);
         let one = [
             ("memory/memory.limit_in_bytes", "9223372036854771712\n"),
             ("memory/a/memory.limit_in_bytes", "1000\n"),
             ("memory/a/memory.usage_in_bytes", "700\n"),
-            ("memory/a/memory.stat", "cache 1\ntotal_cache 100\n"),
+            ("memory/a/memory.stat", "cache 1\nshmem 1\ntotal_cache 100\ntotal_shmem 30\n"),
         ];
         assert_eq!(left("5:cpu,memory:/\n3:cpuset:/a\n", &one), f64::INFINITY);
-        assert_eq!(left("5:cpu,memory:/a\n", &one), 400.0);
+        assert_eq!(left("5:cpu,memory:/a\n", &one), 370.0);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub const UNPRINTED: i32 = 4;
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
-/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; a mesh that is complete stays if only its report could not be made or written (4, 70, 71) or a rank stalls after that (75).
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; a mesh that is complete stays if only its report could not be made or written (4, 70, 71), a rank stalls after that (75) or a second signal arrives (130).
 #[derive(Clone, Parser)]
 #[command(version = env!("VERSION"))]
 pub struct Args {

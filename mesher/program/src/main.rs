@@ -245,7 +245,6 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decide(true);
-    record.report_status("done");
     if let Some(limit) = args.stall_limit {
         comm.enter("done");
         interrupt::stop_at(format_args!("done:{}", comm.rank()));
@@ -327,5 +326,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     let advice = format!("{made}choose another --json or free disk space");
     interrupt::stop_at(format_args!("report:{}", comm.rank()));
     let write = |path: &Path| write_atomically(path, |out| out.write_all(&bytes));
-    agree(comm, on_json(&advice, &write)).map(|()| done)
+    agree(comm, on_json(&advice, &write))?;
+    record.report_status("done");
+    Ok(done)
 }

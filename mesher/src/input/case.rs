@@ -61,9 +61,8 @@ impl Case {
         require(self.layer_cells_min > 0, "layer_cells_min is 0: a layer has at least 1 cell")?;
         let root = match self.root {
             RootSpec::Exact(root) => root,
-            RootSpec::Scale(scale) => {
-                positive("root_scale", scale)?;
-                Root::around(bounds, scale)?
+            RootSpec::Scale(k) => {
+                positive("root_scale", k).and_then(|()| Root::around(bounds, k))?
             }
         };
         positive("the root's edge", root.edge)?;

@@ -165,7 +165,7 @@ impl fmt::Display for Report {
         let [outside, inside, enclosed, ambiguous] =
             [outside, inside, enclosed.count, ambiguous.count].map(grouped);
         write!(f, "components     outside {outside}, inside {inside}; ")?;
-        writeln!(f, "deleted as enclosed {enclosed}, decided by majority {ambiguous}")?;
+        writeln!(f, "enclosed {enclosed}, decided by majority {ambiguous}")?;
         writeln!(f, "digest         {}", mesh.digest)?;
         let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
         let lambda = imbalance(&leaves);
@@ -287,7 +287,7 @@ mod tests {
                     root edge      8 (level 0), surface level 2\n\
                     cells          3,000,000\n  by side      outside 1,000, inside 2,000, crossing 3\n  \
                     level  2                1,234   edge 2e0\n\
-                    components     outside 1,500, inside 1; deleted as enclosed 1,000, decided by majority 7\n\
+                    components     outside 1,500, inside 1; enclosed 1,000, decided by majority 7\n\
                     digest         abc\n\
                     ranks          2, cells max/mean 1.500, base level 1, partitioned along the curve\n\
                     phase              wall s     cpu s   cpu max/mean\n  \

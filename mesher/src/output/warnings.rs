@@ -89,12 +89,12 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
     let (kept, warning) = match keep {
         Keep::Outside => (
             outside - enclosed.count,
-            "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
+            "nothing is outside the geometry, so the mesh of an outer flow has at most crossing leaves: enlarge the root, decrease spacing_min, \
              or set keep = inside",
         ),
         Keep::Inside => (
             inside,
-            "nothing is inside the geometry, so the mesh has at most crossing leaves: close openings wider than a cell \
+            "nothing is inside the geometry, so the mesh of an inner flow has at most crossing leaves: close openings wider than a cell \
              (`harness leak`), remove facets that appear twice (`harness geometry`), change spacing_min, or set keep = outside",
         ),
         Keep::All => (outside + inside, "the geometry crosses all leaves: decrease spacing_min"),

@@ -150,13 +150,7 @@ impl Ownership {
 
     /// Calls `found` with the owners of those octants in the given one that an extent reaches, all of them closed; with some more than
     /// once. The extent reaches the given octant.
-    pub fn owners_in(
-        &self,
-        l: Level,
-        code: u64,
-        extent: &[(i64, i64); 3],
-        found: &mut impl FnMut(usize),
-    ) {
+    pub fn owners_in(&self, l: Level, code: u64, extent: &Extent, found: &mut impl FnMut(usize)) {
         let (interval, owner) = self.interval_at(start57(l, code));
         if interval.end >= start57(l, code + 1) {
             return found(owner);
@@ -246,6 +240,9 @@ impl Ownership {
         self.boundaries.partition_point(|b| b.0 <= start) - 1
     }
 }
+
+/// The least and the greatest lattice coordinate on each axis.
+type Extent = [(i64, i64); 3];
 
 /// Bits of a brick's key; the bits above hold the number of a set.
 pub const KEY_BITS: u32 = 54;

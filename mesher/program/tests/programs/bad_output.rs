@@ -28,9 +28,14 @@ fn unwritable_output_is_refused() {
     for path in ["file/run.json", "absent/run.json", "/proc/run.json", "folder"] {
         refused(&workspace, &to("--json", path), OUTPUT, &[path, "--json"]);
     }
-    for path in ["file/status", "/proc/status"] {
+    for path in ["file/status", "/proc/status", "/proc"] {
         refused(&workspace, &to("--status", path), OUTPUT, &[path]);
     }
+    // The status of a run that fails is its last phase.
+    let failing = [&to("--out", "full")[..], &["--status", "status"]].concat();
+    assert_eq!(run(workspace.mesher(&failing)).code, Some(INPUT));
+    let status = std::fs::read_to_string(workspace.path().join("status/rank-00000.txt"));
+    assert_ne!(status.expect("the status"), "done\n");
     assert_eq!(std::fs::read(workspace.path().join("file")).expect("the file"), b"kept");
 }
 

@@ -123,6 +123,21 @@ fn a_run_that_is_started_to_survive_a_hangup_survives_it() {
     assert!(workspace.path().join("run.json").exists());
 }
 
+/// The first signal at the end of a run does not change its outcome, but no other run begins.
+#[test]
+fn a_service_that_is_interrupted_at_the_end_of_a_run_begins_no_other() {
+    let workspace = workspace();
+    workspace.write("runs", format!("{OUTPUT:?}\n[\"case.toml\", \"--json\", \"other.json\"]\n"));
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("exec '{MESHER}' --serve < runs")]).env("STOP_AT", "end:0");
+    let mut service = start(workspace.enter(command));
+    signal(&["TERM"], service.stopped());
+    let finished = service.finish();
+    assert_eq!((finished.code, finished.stdout.as_str()), (Some(130), "0\n"), "{finished:?}");
+    assert!(workspace.path().join("run.json").exists());
+    assert!(!workspace.path().join("other.json").exists());
+}
+
 /// A job on MPI ranks of which one stops itself, and what is then sent to the launcher or to that rank.
 fn job(
     ranks: usize,

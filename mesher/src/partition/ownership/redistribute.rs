@@ -20,7 +20,7 @@ impl Ownership {
         comm: &dyn Comm,
     ) -> ([BrickSet; N], u64) {
         let sets = sets.into_iter().map(|set| (l, set)).collect();
-        let (sets, sent) = self.redistribute_all(sets, comm);
+        let (sets, sent) = self.send_all(sets, comm);
         (sets.try_into().expect("as many sets as were passed"), sent)
     }
 
@@ -28,7 +28,7 @@ impl Ownership {
     /// replicas agree. Also moves bricks to their new holders after a change of partition. Collective.
     pub fn synchronise_replicas(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
         let levels = sets.iter_mut().flat_map(|set| (0..).zip(std::mem::take(*set)));
-        let (synchronised, _) = self.redistribute_all(levels.collect(), comm);
+        let (synchronised, _) = self.send_all(levels.collect(), comm);
         for (set, whole) in sets.iter_mut().flat_map(|set| set.iter_mut()).zip(synchronised) {
             *set = whole;
         }
@@ -36,11 +36,7 @@ impl Ownership {
 
     /// Sends the octants of several sets, each with its level, to the ranks that hold their bricks. All ranks pass the same
     /// levels in the same order. Collective.
-    fn redistribute_all(
-        &self,
-        mut sets: Vec<(Level, BrickSet)>,
-        comm: &dyn Comm,
-    ) -> (Vec<BrickSet>, u64) {
+    fn send_all(&self, mut sets: Vec<(Level, BrickSet)>, comm: &dyn Comm) -> (Vec<BrickSet>, u64) {
         if self.ranks == 1 {
             return (sets.into_iter().map(|(_, set)| set).collect(), 0);
         }
@@ -85,15 +81,9 @@ impl Ownership {
         (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
 
-    /// Adds the bricks of set `set_index` that other ranks hold to `out`. Returns the range of the set that this rank
+    /// Adds the bricks of set `i` that other ranks hold to `out`. Returns the range of the set that this rank
     /// retains. Fully replicated bricks are removed: the allgather returns them to all ranks.
-    fn select(
-        &self,
-        set_index: usize,
-        l: Level,
-        set: &mut BrickSet,
-        out: &mut Outgoing,
-    ) -> Range<usize> {
+    fn select(&self, i: usize, l: Level, set: &mut BrickSet, out: &mut Outgoing) -> Range<usize> {
         if l > self.level_replicated && self.intervals().count() == 1 {
             // No brick has several owners, and the bricks of each interval are contiguous.
             let position = |start: u64| set.position(start >> (3 * (LEVEL_MAX + 2 - l)));
@@ -104,7 +94,7 @@ impl Ownership {
                     let (interval, owner) = self.interval_at(brick_start(l, set.brick(first).key));
                     let same_owner = first..position(interval.end);
                     first = same_owner.end;
-                    out.queue(set_index, set, same_owner, owner);
+                    out.queue(i, set, same_owner, owner);
                 }
             }
             return local;
@@ -114,7 +104,7 @@ impl Ownership {
             if placement == Placement::Local {
                 return b.bits;
             }
-            let entry = [(set_index as u64) << KEY_BITS | b.key, b.bits];
+            let entry = [(i as u64) << KEY_BITS | b.key, b.bits];
             if placement == Placement::FullyReplicated {
                 out.full.push(entry);
                 return 0;
@@ -149,12 +139,12 @@ struct Outgoing {
 
 impl Outgoing {
     /// Queues bricks of a set for rank `to`.
-    fn queue(&mut self, set_index: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
+    fn queue(&mut self, index: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
         if bricks.len() > ENTRIES_MAX {
             let range = [bricks.start as u64, bricks.end as u64];
-            return self.queue.push((to, set_index as u64, range));
+            return self.queue.push((to, index as u64, range));
         }
-        let entry = |b: Brick| [(set_index as u64) << KEY_BITS | b.key, b.bits];
+        let entry = |b: Brick| [(index as u64) << KEY_BITS | b.key, b.bits];
         self.queue.extend(bricks.map(|position| (to, ENTRIES, entry(set.brick(position)))));
     }
 }
