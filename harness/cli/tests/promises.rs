@@ -246,6 +246,53 @@ fn what_is_not_promised_is_not_checked() {
     }
 }
 
+/// A check without an object does not hold.
+#[test]
+fn a_promise_about_nothing_is_not_kept() {
+    let fixture = Fixture::new();
+    let nothing = |promise: &str, why: &str| {
+        fixture.engine("right", promise);
+        let verified = fixture.verify("--no-mpi --require checks");
+        assert_eq!(verified.code, 3, "{promise}: {}", verified.printed);
+        assert!(verified.printed.contains(why), "{promise}: {}", verified.printed);
+    };
+    fixture.write(
+        "case.toml",
+        &CASE.replace("[0.0, 0.0, 0.0]\nmax = [3.0", "[40.0, 0.0, 0.0]\nmax = [43.0"),
+    );
+    nothing("boxes = true", "no leaf meets a box of the case");
+    fixture.write("case.toml", &CASE.replace("keep = \"all\"", "keep_crossing = false"));
+    // The deleted leaves of T0 at the surface are finer.
+    npy::write(&fixture.path("right.npy"), &[word::encode(Octant::ROOT, Side::Outside)]).unwrap();
+    nothing("balance = 'face'", "all leaves have level 0");
+    fixture
+        .write("simulated.toml", &FOREST.replace("parallel = [\"{launcher}\", ", "simulated = ["));
+    copying(&fixture, "unitcube");
+    let verified = fixture.harness("verify case.toml --engine simulated.toml");
+    assert!(verified.printed.contains("ranks: "), "{}", verified.printed);
+    assert!(verified.printed.contains("1 left out"), "{}", verified.printed);
+}
+
+/// The mesh on each number of ranks is checked if it may be another one.
+#[test]
+fn promises_are_checked_on_every_number_of_ranks_that_is_timed() {
+    let fixture = Fixture::new();
+    fixture.engine("ranks", "layers = true");
+    let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nengines = ['foreign.toml']\nmpi = [2, 3]\n";
+    fixture.write("study.toml", series);
+    let bench = "bench study.toml --record record.jsonl --mesher ./engine --repeat 1";
+    let measured = fixture.harness(bench);
+    assert_eq!(measured.code, 1, "{}", measured.printed);
+    let record = fs::read_to_string(fixture.path("record.jsonl")).unwrap();
+    let failed: Vec<&str> = record.lines().filter(|line| line.contains("\"failure\"")).collect();
+    assert_eq!(failed.len(), 1, "{record}");
+    assert!(failed[0].contains("breaks the promise layer"), "{record}");
+    assert!(
+        record.lines().filter(|line| line.contains("\"kind\":\"run\"")).count() == 2,
+        "{record}"
+    );
+}
+
 #[test]
 fn a_mesh_that_depends_on_what_it_must_not_is_reported() {
     let fixture = Fixture::new();

@@ -118,8 +118,7 @@ impl Case {
         let why = "layer_cells_min is 0; a layer has at least one cell";
         Failure::unless(layer_cells_min > 0, why)?;
         let level = |what: &str, spacing| {
-            let deep =
-                || format!("{what} = {spacing} requires a level deeper than 19; increase it");
+            let deep = || format!("{what} = {spacing} needs a level deeper than 19; increase it");
             root.level_for(spacing).ok_or_else(deep)
         };
         let level_surface = level("spacing_min", file.spacing_min)?;

@@ -123,8 +123,7 @@ impl Catalogue {
             io::ErrorKind::NotFound => wrong(missing.to_owned()),
             _ => wrong(error.to_string()),
         })?;
-        let file: CatalogueFile =
-            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let file: CatalogueFile = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
         let mut cases = file.case;
         for case in &mut cases {
             case.argument.clone_from(&case.name);

@@ -59,12 +59,8 @@ impl Manifest {
     ///
     /// If a rule of section 3 requires the split of an octant, it requires the split of its ancestors, so the leaf is
     /// the first octant on the way down that no rule splits.
-    pub fn base_leaf_at(
-        &self,
-        point: [i64; 3],
-        facets: &[FacetLattice],
-    ) -> (Octant, Option<usize>) {
-        let cell = Octant { corner: point.map(|q| (q / UNITS_PER_CELL) as u32), level: LEVEL_MAX };
+    pub fn base_leaf_at(&self, at: [i64; 3], facets: &[FacetLattice]) -> (Octant, Option<usize>) {
+        let cell = Octant { corner: at.map(|q| (q / UNITS_PER_CELL) as u32), level: LEVEL_MAX };
         let mut crossing: Vec<_> = facets.iter().map(Triangle::new).enumerate().collect();
         let mut octant = Octant::ROOT;
         loop {

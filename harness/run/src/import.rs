@@ -177,7 +177,7 @@ fn cells(bytes: &[u8], stated: Stated) -> Result<Cells> {
 }
 
 /// What ends a path within a command of a shell.
-const ENDS: [char; 6] = [' ', '\'', '"', ';', '&', '|'];
+const ENDS: [char; 11] = [' ', '\t', '\n', '\'', '"', ';', '&', '|', '<', '>', ')'];
 
 /// The beginning of the paths that a run writes in a format that is imported: the value of `{out}`.
 pub(crate) fn foreign(place: &Path) -> PathBuf {
@@ -331,7 +331,7 @@ mod tests {
     proptest! {
         /// Whatever surrounds `{out}` in a word, the path begins with it and ends where a shell would end it.
         #[test]
-        fn a_path_begins_with_out(before in "[a-z=-]{0,8}", rest in "[a-z./_0-9]{0,12}", after in "([ ;'\"&|][ -~]{0,8})?") {
+        fn a_path_begins_with_out(before in "[a-z=-]{0,8}", rest in "[a-z./_0-9]{0,12}", after in "([ \t\n;'\"&|<>)][ -~]{0,8})?") {
             let out = Path::new("/a place/written/mesh");
             let mut command = Command::new("sh");
             command.arg("-c").arg(format!("{before}{}{rest}{after}", out.display()));

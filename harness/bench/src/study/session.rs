@@ -13,6 +13,7 @@ use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Meshes, another_mesh};
 use crate::experiments::{machine, network};
 use crate::jsonl;
+use check::promises::Independence;
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{Failure, Progress, Result};
@@ -148,8 +149,8 @@ struct Session<'a> {
     meshes: Meshes,
     /// Runs that are complete.
     made: BTreeSet<String>,
-    /// Programs and cases that have been run at least once.
-    warm: BTreeSet<(String, PathBuf)>,
+    /// Programs and cases that have been run at least once; and numbers of ranks, where the mesh may depend on it.
+    warm: BTreeSet<((String, PathBuf), Option<usize>)>,
 }
 
 impl Session<'_> {
@@ -350,6 +351,8 @@ impl Session<'_> {
             let engine = &self.runner.programs.named(&setup.engine).description;
             let declined = engine.declines(&Case::read(&mesh.1)?);
             let (is_declined, layout) = (declined.is_some(), (setup.ranks, setup.comm));
+            let is_one_mesh = engine.promises.is_independent_of(Independence::Ranks);
+            let warm = (mesh.clone(), (!is_one_mesh).then_some(setup.ranks));
             match declined.or_else(|| excess(&self.lines, &setup, self.runner.limit)) {
                 Some(why) => {
                     // What takes too long on one rank may not on two.
@@ -360,12 +363,10 @@ impl Session<'_> {
                     (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
                     self.append(Entry::LeftOut(NoResult { setup, why }))?;
                 }
-                None if self.warm.insert(mesh.clone()) => {
+                None if !self.warm.contains(&warm) => {
                     self.run(&mut points[index], None)?;
-                    // The mesh of the next run is checked, too.
-                    if points[index].failed {
-                        self.warm.remove(&mesh);
-                    }
+                    // If it failed, the mesh of the next run is checked, too.
+                    self.warm.extend((!points[index].failed).then_some(warm));
                 }
                 None => {}
             }

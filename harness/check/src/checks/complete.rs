@@ -10,7 +10,7 @@
 use super::contact;
 use super::region::Survey;
 use super::truth::{Found, Truth};
-use super::{Check, CheckResult, Subject, some_leaves};
+use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
 use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Handle, Kind, Tree};
@@ -35,7 +35,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             truth.compare(tree, &mut |found| compare(&found, terms, result));
         }
         None if terms.sides == Sides::Unknown && deletes => {
-            return result.lacks(super::UNKNOWN_SIDES);
+            return result.lacks(UNKNOWN_SIDES);
         }
         None => check_holes(tree, terms, result),
     }

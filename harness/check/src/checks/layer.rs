@@ -45,7 +45,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let none = is_balance && !has_extra_layer;
     let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
     let missing = some_leaves(subject).or_else(|| none.then(why));
-    result.requires(missing.or_else(|| several_levels(subject)));
+    result.requires(missing.or_else(|| several_levels(subject, tree)));
 }
 
 fn check_layers(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {

@@ -29,8 +29,7 @@ pub(crate) fn differing(
     (owner_b, b): Owned,
 ) -> Vec<String> {
     let (a, b) = (stated(a), stated(b));
-    let text =
-        |value: Option<&Value>| value.map_or_else(|| "not stated".to_owned(), Value::to_string);
+    let text = |value: Option<&Value>| value.map_or_else(|| "not stated".into(), Value::to_string);
     let line = |key: &str| {
         let [x, y] = [&a, &b].map(|entries| entries.pointer(&format!("/{key}")));
         (x != y).then(|| format!("{key}: {} in {owner_a}; {} in {owner_b}", text(x), text(y)))

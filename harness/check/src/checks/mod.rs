@@ -27,6 +27,7 @@ pub mod truth;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Outcome};
 pub use subject::{CAPACITY, Subject};
 
+use contract::tree::{Handle, Tree};
 use serde::Serialize;
 
 pub(crate) use pass::Pass;
@@ -107,15 +108,14 @@ fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     }
 }
 
-/// Why a check that compares leaves of several levels can find nothing.
-fn several_levels(subject: &Subject) -> Option<String> {
-    let tree = subject.tree_with_deleted();
+/// Why a check that compares leaves of several levels in this tree can find nothing.
+fn several_levels(subject: &Subject, tree: &Tree) -> Option<String> {
     let level = tree.finest_level(tree.root(), 0);
     let uniform = tree.coarsest_level(tree.root(), 0) >= level;
     some_leaves(subject).or_else(|| uniform.then(|| format!("all leaves have level {level}")))
 }
 
 fn some_leaves(subject: &Subject) -> Option<String> {
-    let is_empty = subject.tree_with_deleted().root() == contract::tree::Handle::HOLE;
+    let is_empty = subject.tree_with_deleted().root() == Handle::HOLE;
     is_empty.then(|| NO_LEAVES.to_owned())
 }

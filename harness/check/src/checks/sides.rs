@@ -38,8 +38,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     of_neighbours(subject.tree(), terms, result);
     let Some(truth) = subject.truth() else {
         let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
-        let alike =
-            || (kinds.count_ones() == 1).then(|| "all leaves have the same side".to_owned());
+        let alike = || (kinds.count_ones() == 1).then(|| "all leaves have one side".to_owned());
         return result.requires(some_leaves(subject).or_else(alike));
     };
     let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };

@@ -26,9 +26,12 @@ pub(super) const BOXES: Check = Check {
     name: "boxes",
     wanted: |subject| !subject.promises.definition && subject.promises.boxes,
     run: |subject, result| {
-        boxes_met(subject.tree(), &subject.terms, result);
-        let why = if subject.terms.lacks_inputs { UNKNOWN_INPUTS } else { "the case has no boxes" };
-        result.requires(subject.terms.boxes.is_empty().then_some(why));
+        let (tree, terms) = (subject.tree(), &subject.terms);
+        boxes_met(tree, terms, result);
+        let is_met = |octant: &Octant, _| terms.boxes.iter().any(|extent| extent.meets(octant));
+        tree.walk_where(is_met, &mut |_, _| result.examined += 1);
+        let none = "no leaf meets a box of the case";
+        result.needs_objects(if terms.lacks_inputs { UNKNOWN_INPUTS } else { none });
     },
 };
 

@@ -43,8 +43,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
-    let available =
-        labelled(meminfo, "MemAvailable:").map_or(u64::MAX, |kilobytes| 1024 * kilobytes);
+    let available = labelled(meminfo, "MemAvailable:").map_or(u64::MAX, |kib| 1024 * kib);
     let needed = leaves.saturating_mul(BYTES_PER_LEAF);
     if needed <= available {
         return Ok(());

@@ -126,9 +126,7 @@ impl Split {
                     let levels = leaf.level - octant.level;
                     format!(", step 3 (balance): it touches, {levels} levels finer, the leaf")
                 }
-                Rule::ExtraLayer => {
-                    " (extra layer): it touches the deleted crossing leaf".to_owned()
-                }
+                Rule::ExtraLayer => " (extra layer): it touches the deleted crossing leaf".into(),
             };
             clauses.push(format!("{subject}by section 6{near} {}", root.place(*leaf)));
             (octant, subject) = (leaf.parent(), "its parent is split ");

@@ -28,8 +28,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
     let (of, shown) = (&disk.manifest, made.dir.display());
-    let why =
-        format!("{shown} states no inputs or no sides, from which answers follow: give --case");
+    let why = format!("{shown} states no inputs or no sides, on which answers rest: give --case");
     let is_whole = !of.lacks_inputs && of.sides == contract::manifest::Sides::Known;
     Failure::unless(is_whole || case.is_some(), why)?;
     let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();

@@ -281,6 +281,11 @@ mod tests {
         for of in ["ranks", "partitioner"] {
             assert!(with(of, "").unwrap_err().why.contains("with which to vary it"), "{of}");
         }
+        let parallel =
+            "parallel = ['{launcher}', '{case}', '{out}']\npartitioner = ['{partitioner}']\n";
+        let alone = with("partitioner", parallel).unwrap_err().why;
+        assert!(alone.contains("add \"ranks\""), "{alone}");
+        assert!(with("ranks', 'partitioner", parallel).is_ok());
         assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
         let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err().why;
         assert!(empty.contains("[promises] is empty"), "{empty}");

@@ -124,8 +124,7 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
         let start = Instant::now();
         Ok((start, Session::start(command)?.0, [stdout, stderr]))
     };
-    let (start, mut session, outputs) =
-        start().map_err(|error| cannot_be_started(command, &error))?;
+    let (start, mut session, outputs) = start().map_err(|e| cannot_be_started(command, &e))?;
     let mut peak_rss_bytes = None;
     let outputs = outputs.each_ref();
     let ended = watch.until(start, &outputs, || {

@@ -91,7 +91,15 @@ impl Templates {
         Failure::unless(varies(Independence::Ranks, [&self.parallel, &self.simulated]), why)?;
         let why = "`independent_of` names partitioner, but [run] has neither `partitioner` nor `level_base` with which to vary it";
         let keys: [&[String]; 2] = [&self.partitioner, &self.level_base];
-        Failure::unless(varies(Independence::Partitioner, keys), why)
+        Failure::unless(varies(Independence::Partitioner, keys), why)?;
+        // On several ranks alone, where the mesh is then compared with that of other numbers.
+        let is_compared = promises.is_independent_of(Independence::Ranks);
+        let why =
+            "`independent_of` names partitioner, but not ranks, which vary with it: add \"ranks\"";
+        Failure::unless(
+            is_compared || !promises.independent_of.contains(&Independence::Partitioner),
+            why,
+        )
     }
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
@@ -182,8 +190,7 @@ fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<()> {
     let mut named = words.iter().flat_map(|word| placeholders(word));
     named.find(|name| !known.contains(name)).map_or(Ok(()), |name| {
         let known = known.join(" ");
-        let why =
-            format!("`{key}` has the unknown placeholder {{{name}}}; known there are {known}");
+        let why = format!("`{key}` has the unknown placeholder {{{name}}}; known are {known}");
         Err(Failure::input(why))
     })
 }

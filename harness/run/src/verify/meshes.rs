@@ -230,7 +230,9 @@ impl CaseRun<'_> {
     /// Runs every layout on MPI and checks its mesh.
     pub(super) fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
         if let Some(why) = self.all.needs.lacks(Need::Mpi) {
-            return match self.all.options.no_mpi {
+            let is_promised = self.promises().independent_of.contains(&Independence::Ranks);
+            let varies_otherwise = is_promised && self.engine().run.parallel.is_empty();
+            return match self.all.options.no_mpi || varies_otherwise {
                 true => self.leave_out(("ranks", RUNS), why),
                 false => self.leave_out_ranks(why),
             };
