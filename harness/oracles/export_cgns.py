@@ -85,6 +85,10 @@ def faces_of_cells(owners, neighbours):
 
 
 def write(at, file):
+    with open(at / "owner", "rb") as owner:
+        is_wide = b"label=64" in owner.read(4096)
+    if is_wide:
+        raise Refused("needs numbers beyond 32 bits: export a part of the mesh")
     points = Foam(at / "points").points()
     begins, vertices = Foam(at / "faces").faces(len(points))
     owners, neighbours = (Foam(at / name).labels() for name in ("owner", "neighbour"))

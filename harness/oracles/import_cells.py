@@ -59,7 +59,10 @@ def csv(path, request):
     comment before it with as many words as there are fields, x, y and z among them, as NumPy writes it. Other lines that begin with # are comments."""
     text = read_text(path)
     for number, line in enumerate(text.splitlines(), 1):
-        fields = [field.strip() for field in line.partition("#")[0].split(",")]
+        data = line.partition("#")[0]
+        fields = [field.strip() for field in data.split(",")]
+        if data.strip(" \t,;") and any(not field.strip() for mark in ",;" for field in data.split(mark)[:-1]):
+            raise Refused(f"has an empty field in line {number}: fill it in, or remove it")
         quoted = "".join(line.split('"')[1::2]) if '"' in line else ""
         if "," in quoted or len(fields) > 1 and any(re.search(r"[;\s]", field) for field in fields):
             raise Refused(f"has decimal commas or several separators in line {number}: write decimal points and one separator")
@@ -345,11 +348,23 @@ class Foam:
         return begins, vertices
 
 
+def refuse_newer(at):
+    """Of a case, the mesh in `constant` may be the one that another was made of."""
+    written = (at / "faces").stat().st_mtime
+    times = at.parent.parent.glob("[0-9]*/polyMesh/faces")
+    parts = (file for file in at.parent.parent.glob("processor*/*/polyMesh/faces") if file.stat().st_mtime > written)
+    others = sorted(str(file.parent) for file in itertools.chain(times, parts))
+    if others:
+        raise Refused(f"has a newer mesh than {at}, {others[-1]}: give the directory polyMesh that is meant, and reconstruct a decomposed mesh")
+
+
 def openfoam(path, request):
     """A mesh in a directory. Sides are a list of labels in it; `cellLevel`, if there is one, must agree with the edges."""
     at = pathlib.Path(path)
     points = Foam(at / "points").points()
     begins, vertices = Foam(at / "faces").faces(len(points))
+    if request.get("is_case"):
+        refuse_newer(at.resolve())
     faces = len(begins) - 1
     # A cell has at least four faces, and a face at most two cells.
     owners, neighbours = (Foam(at / name).labels(faces // 2 + 1) for name in ("owner", "neighbour"))

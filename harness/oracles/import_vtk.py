@@ -17,6 +17,7 @@ try:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkBitArray, vtkIdList, vtkLogger, vtkOutputWindow, vtkStringOutputWindow, vtkTypeInt64Array
     from vtkmodules.vtkCommonDataModel import VTK_HEXAHEDRON, VTK_VOXEL
+    from vtkmodules.vtkFiltersCore import vtkAppendFilter
     from vtkmodules.vtkIOHDF import vtkHDFReader
     from vtkmodules.vtkIOLegacy import vtkUnstructuredGridReader
     from vtkmodules.vtkIOXML import (
@@ -94,7 +95,22 @@ def read(path):
     if text or reader.GetErrorCode():
         why = errors[0] if errors else f"error {reader.GetErrorCode()}"
         raise Refused(f"cannot be read by VTK: {why.encode('ascii', 'replace').decode()}")
-    return reader.GetOutput()
+    if isinstance(reader, vtkHDFReader) and reader.GetNumberOfSteps() > 1:
+        raise Refused(f"has {reader.GetNumberOfSteps()} time steps: write the one that is meant to a file of its own")
+    data = reader.GetOutput()
+    return merged(data) if data is not None and data.IsA("vtkPartitionedDataSet") else data
+
+
+def merged(partitions):
+    """The partitions, which are unstructured grids, as one."""
+    append = vtkAppendFilter()
+    for index in range(partitions.GetNumberOfPartitions()):
+        part = partitions.GetPartition(index)
+        if not part.IsA("vtkUnstructuredGrid"):
+            raise Refused(f"has a partition that is a {part.GetClassName()}: unstructured grids are supported")
+        append.AddInputData(part)
+    append.Update()
+    return append.GetOutput()
 
 
 def cell_array(data, name):
@@ -276,18 +292,19 @@ def cells(path, request):
         corners, edges, nodes, root = of_hyper_trees(data)
         digest, name = None, name or ("side" if is_own_tree(path) else None)
     elif data is not None and data.IsA("vtkUnstructuredGrid"):
-        (corners, edges), nodes = of_unstructured(data), slice(None)
+        corners, edges = of_unstructured(data)
+        nodes = np.arange(len(edges))
         root, digest = of_export(path, data, edges)
-        ghosts = data.GetCellData().GetArray("vtkGhostType")
-        if ghosts is not None:
-            nodes = np.flatnonzero(vtk_to_numpy(ghosts) & NOT_OF_MESH == 0)
-            corners, edges = corners[nodes], edges[nodes]
         if digest is not None:
             name = name or ("side" if data.GetCellData().HasArray("side") else None)
             # That of the leaves with the sides of the export, or with none.
             digest = digest if name in ("side", None) else None
     else:
         raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
+    ghosts = data.GetCellData().GetArray("vtkGhostType")
+    if ghosts is not None:
+        kept = vtk_to_numpy(ghosts)[nodes] & NOT_OF_MESH == 0
+        corners, edges, nodes = corners[kept], edges[kept], nodes[kept]
     sides = cell_array(data, name)[nodes] if name else None
     return corners, edges, {"root": root, "digest": digest, "sides": sides}
 

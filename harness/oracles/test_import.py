@@ -12,9 +12,11 @@ import sys
 import tempfile
 import unittest
 
+import h5py
 import numpy as np
 import pyvista
 import vtk
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
 from built import PROGRAMS, ROOT, needs, run, samples
 
@@ -345,6 +347,31 @@ class ImportTest(unittest.TestCase):
             writer = "vtkXMLPUnstructuredGridWriter" if path.suffix == ".pvtu" else "vtkXMLUnstructuredGridWriter"
             write(grid, writer, path)
             self.check(path, self.rows[kept], self.sides[kept])
+        trees = hyper_trees(self.rows, self.sides, 1, False)
+        flags = numpy_to_vtk((vtk_to_numpy(trees.GetCellData().GetArray("body")) == 1).astype(np.uint8), deep=True)
+        flags.SetName("vtkGhostType")
+        trees.GetCellData().AddArray(flags)
+        write(trees, "vtkXMLHyperTreeGridWriter", self.at / "ghosts.htg")
+        self.check(self.at / "ghosts.htg", self.rows[self.sides != 1], self.sides[self.sides != 1])
+
+    def test_a_file_in_partitions_is_whole_and_one_in_time_steps_is_refused(self):
+        parts = vtk.vtkPartitionedDataSet()
+        for index in range(2):
+            parts.SetPartition(index, hexahedra(self.rows[index::2], self.sides[index::2]))
+        path = self.at / "parts.vtkhdf"
+        write(parts, "vtkHDFWriter", path)
+        self.check(path, self.rows, self.sides)
+        path = self.at / "steps.vtkhdf"
+        write(hexahedra(self.rows, self.sides), "vtkHDFWriter", path)
+        with h5py.File(path, "r+") as file:
+            steps = file["VTKHDF"].create_group("Steps")
+            steps.attrs["NSteps"] = 2
+            for name, values in [("Values", [0.0, 1.0]), ("PartOffsets", [0, 0]), ("NumberOfParts", [1, 1]), ("PointOffsets", [0, 0])]:
+                steps[name] = np.array(values)
+            steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = np.zeros((2, 1), int)
+            for name in ("PointDataOffsets", "CellDataOffsets", "FieldDataOffsets"):
+                steps.create_group(name)
+        self.assertIn("has 2 time steps", self.refused(path))
 
     def test_an_absent_cell_array_is_named(self):
         path = self.at / "mesh.vtu"

@@ -3,6 +3,7 @@ python -m unittest discover harness/oracles"""
 
 import itertools
 import json
+import os
 import pathlib
 import random
 import resource
@@ -207,6 +208,23 @@ class CellsTest(unittest.TestCase):
             done = subprocess.run(command, capture_output=True, text=True, **environment)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
             self.assertIn("was read, but its cells cannot be written to a temporary file", done.stderr)
+
+    def test_an_empty_field_is_named(self):
+        for text in ("0,0,0,1\n1,,0,1,1\n", "x;y;z;level\n0;;0;1\n", ",0,0,1\n"):
+            self.assertIn("has an empty field in line", self.refused(self.table(text)))
+        read(self.table("x,y,z,level,\n0,0,0,0,\n"), root=root_of([0, 0, 0, 1]))
+
+    def test_a_case_with_a_newer_mesh_is_refused(self):
+        copy = self.edited("foam-ascii", "points", lambda content: content)
+        for case, other in (("time", "2/polyMesh"), ("parallel", "processor1/constant/polyMesh")):
+            mesh = shutil.copytree(copy, self.at / case / "constant/polyMesh")
+            asked = {"sides": None, "is_case": True}
+            import_cells.openfoam(str(mesh), asked)
+            newer = shutil.copytree(copy, self.at / case / other) / "faces"
+            os.utime(newer, (newer.stat().st_atime, (mesh / "faces").stat().st_mtime + 1))
+            with self.assertRaisesRegex(Refused, f"has a newer mesh than .*{other}"):
+                import_cells.openfoam(str(mesh), asked)
+            import_cells.openfoam(str(mesh), asked | {"is_case": False})
 
     def test_sides_of_an_openfoam_mesh_are_a_list_of_labels(self):
         copy = self.edited("foam-ascii", "cellLevel", lambda content: content)

@@ -25,7 +25,7 @@ pub const FORMATS: &[Format] = &[
     Format { ending: ".vtu", purpose: "cells for ParaView, VisIt and pyvista", write: vtu::write },
     Format {
         ending: ".p8est",
-        purpose: "a forest for p8est_load of p4est, deal.II, t8code and ForestClaw",
+        purpose: "a forest for p8est_load of p4est up to 2.2",
         write: p8est::write,
     },
     Format {

@@ -59,6 +59,8 @@ impl Leaves {
     /// # Errors
     /// If the mesh cannot be read, or if the user interrupts.
     pub fn read(export: &Export<'_>, takes: &mut dyn FnMut(&Leaf, bool) -> bool) -> Result<Self> {
+        let why = "the mesh has 2^32 leaves or more, of which this format needs all, selected or not: write .vtu or .vtkhdf";
+        Failure::unless(u32::try_from(export.mesh.leaf_count()).is_ok(), why)?;
         let mut words = Vec::new();
         export.mesh.leaves(&|_| true, &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
@@ -68,8 +70,6 @@ impl Leaves {
             }
             if is_selected { export.require_resolved(leaf.octant.level) } else { Ok(()) }
         })?;
-        let why = "the mesh has 2^32 leaves or more, of which this format needs all, selected or not: write .vtu or .vtkhdf";
-        Failure::unless(u32::try_from(words.len()).is_ok(), why)?;
         Ok(Self::new(words))
     }
 

@@ -1,4 +1,4 @@
-//! Forests for `p8est_load` of p4est 2, which deal.II, t8code and ForestClaw build on.
+//! Forests for `p8est_load` of p4est up to 2.2. Later versions have coordinates of other units, and refuse them.
 //!
 //! The file is that of `p8est_save`: the connectivity of one tree, whose vertices are the corners of the root; the header; and
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.

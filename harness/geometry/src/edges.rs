@@ -190,15 +190,10 @@ pub fn stray(input: &Input, first: usize) -> Finding {
 
 /// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. Two with a solid behind each, by the numbers of
 /// `solids`, are where solids touch: a wall, if the inside is meshed. A facet that is left out of the edges is no duplicate.
-pub fn duplicates(
-    input: &Input,
-    edges: &Edges,
-    solids: &BTreeMap<u32, i64>,
-    first: usize,
-) -> Finding {
+pub fn duplicates(input: &Input, of: &Edges, solids: &BTreeMap<u32, i64>, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Duplicates);
     let mut copies: HashMap<_, Vec<u32>> = HashMap::new();
-    for (corners, facet) in edges.corners.iter().zip(0u32..) {
+    for (corners, facet) in of.corners.iter().zip(0u32..) {
         let Some(corners) = corners.map(sorted) else { continue };
         let copies = copies.entry(corners).or_default();
         copies.push(facet);

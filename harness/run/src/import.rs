@@ -140,7 +140,7 @@ fn read(
     let place = tempfile::tempdir().map_err(Failure::unreadable)?;
     let table = place.path().join("cells");
     let mut asked = json!(request);
-    asked["format"] = json!(format);
+    (asked["format"], asked["is_case"]) = (json!(format), json!(mesh != path));
     let asked = asked.to_string();
     let arguments = [mesh.as_os_str(), table.as_os_str(), asked.as_ref()];
     let finished = python::run(name, script, arguments, paths, limit, place.path());
@@ -195,9 +195,8 @@ pub(crate) fn clear(place: &Path, mesh: &Path) -> std::io::Result<()> {
 fn path_in(command: &Command, out: &Path) -> PathBuf {
     let out = out.to_string_lossy();
     let mut words = command.get_args().map(|word| word.to_string_lossy().into_owned());
-    let rest =
-        words.find_map(|word| Some(word.split_once(&*out)?.1.to_owned())).unwrap_or_default();
-    PathBuf::from(format!("{out}{}", rest.split(ENDS).next().unwrap_or_default()))
+    let end = words.find_map(|word| Some(word.split_once(&*out)?.1.to_owned())).unwrap_or_default();
+    PathBuf::from(format!("{out}{}", end.split(ENDS).next().unwrap_or_default()))
 }
 
 /// Makes the mesh of a run that ended well a leaf-set directory, unless it is one, and opens it. Its manifest has the inputs of the

@@ -31,7 +31,7 @@ pub struct Group {
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
-    /// The network of projected times: that of the typical run's session.
+    /// The network of projected times: that of the last repetition's session, so that groups of the same sessions have the same one.
     pub network: Network,
 }
 
@@ -42,7 +42,7 @@ impl Group {
         let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
         let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
         let nearest = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
-        let (mut typical, network) = (*nearest).clone();
+        let (mut typical, network) = (nearest.0.clone(), repetitions.last()?.1);
         let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
@@ -70,9 +70,11 @@ impl Group {
         median(&self.runs.iter().map(value).collect::<Option<Vec<f64>>>()?)
     }
 
-    /// Returns the median of peak memory per cell, in bytes; `None` if it is unknown in a run.
+    /// Returns the median of peak memory per cell, in bytes; `None` if it is unknown in a run. Simulated ranks share one process, whose memory
+    /// says nothing of as many processes.
     pub fn bytes_per_cell(&self) -> Option<Median> {
-        let peak = |run: &Run| Some(run.peak_rss_bytes.sum).filter(|bytes| *bytes > 0.0);
+        let is_known = self.setup.comm != Comm::Sim || self.setup.ranks == 1;
+        let peak = |run: &Run| Some(run.peak_rss_bytes.sum).filter(|of| is_known && *of > 0.0);
         self.median_of(|run| Some(peak(run)? / run.cells.max(1) as f64))
     }
 
@@ -207,8 +209,8 @@ impl Groups {
                 Entry::Network(_) => {}
             }
         }
-        let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
-        let all: Vec<Group> = by_setup.filter_map(|(setup, of)| Group::of(setup, &of)).collect();
+        let groups = by_key(&runs, |(run, _)| (run.setup.clone(), run.oversubscribed)).into_iter();
+        let all: Vec<Group> = groups.filter_map(|((of, _), runs)| Group::of(of, &runs)).collect();
         let is_of = |g: &Group, s: &Setup| (&g.setup.engine, &g.setup.case) == (&s.engine, &s.case);
         let as_named = |(at, session, setup, why): (usize, &String, &Setup, String)| {
             let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {
@@ -292,7 +294,7 @@ impl Groups {
     pub fn global_efficiency(&self, group: &Group) -> Median {
         let base = self.reference(group);
         let useful = base.median_of(|run| group.efficiency(base).map(|_| run.useful_s.sum));
-        let time = useful.unwrap_or(base.time_s);
+        let time = useful.filter(|of| of.low > 0.0).unwrap_or(base.time_s);
         self.of_times(group, group.global_efficiency(base), time)
     }
 
@@ -319,10 +321,11 @@ impl Groups {
         group.efficiency(self.reference(group))
     }
 
-    /// Returns the networks of these groups, as text.
+    /// Returns the networks of those of these groups that are projected, as text.
     pub fn networks<'a>(groups: impl IntoIterator<Item = &'a Group>) -> String {
-        let networks = groups.into_iter().map(|group| group.network.to_string());
-        distinct(networks).join("; in another session ")
+        let of = groups.into_iter().filter(|group| group.setup.comm == Comm::Sim);
+        let text = distinct(of.map(|of| of.network.to_string())).join("; in another session ");
+        if text.is_empty() { "nothing, as no ranks are simulated".to_owned() } else { text }
     }
 
     /// Returns simulated groups, each with that of the same mesh on equally many ranks of MPI without oversubscription.
@@ -370,7 +373,7 @@ fn pooled_nodes(lines: &[Line]) -> Vec<String> {
     let by_machine = by_key(sessions, |session| session.machine.label()).into_iter();
     let counts = by_machine.map(|(_, of)| distinct(of.into_iter().map(|s| &s.nodes)).len());
     let several = counts.filter(|count| *count > 1);
-    several.map(|n| format!("runs of {n} nodes are taken for those of one machine")).collect()
+    several.map(|n| format!("runs on {n} lists of nodes are taken for one machine's")).collect()
 }
 
 /// What the case of a run is by name: that of a series, or a mesh of targets, which may have the name of another case.

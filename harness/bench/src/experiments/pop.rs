@@ -150,7 +150,7 @@ pub fn above_one(all: &[Efficiency]) -> Option<String> {
          same facets does not grow with the mesh, smaller parts of a mesh fit into caches better, or the base case was disturbed.",
     );
     let transfer = exceeds(|e| e.transfer).then_some(
-        "Transfer is above 1 where ranks do not wait at the end of every phase, or where the clocks disagree.",
+        "Transfer is above 1 where ranks do not wait at the end of every phase, where the clocks disagree, or where medians by phase exceed those of whole runs.",
     );
     let reasons: Vec<&str> = [scaling, transfer].into_iter().flatten().collect();
     let above = all.iter().find(|e| e.is_above_one());

@@ -125,6 +125,21 @@ fn what_needs_unknown_sides_is_not_checked() {
     }
 }
 
+/// Components are compared with seeds, with the manifest's counts, and with the boundary of a mesh without enclosed ones.
+#[test]
+fn what_states_nothing_about_components_does_not_keep_the_right_ones() {
+    let mut set = leaf_set(vec![correct()]);
+    let is_checked = |set: &LeafSet| {
+        let found = audited(set).checks.into_iter().find(|check| check.name == "kept").unwrap();
+        assert!(found.holds() || !found.was_run(), "{found}");
+        found.was_run()
+    };
+    set.manifest.keep = Keep::Outside;
+    assert!(is_checked(&set));
+    set.manifest.enclosed = contract::manifest::Enclosed::Keep;
+    assert!(!is_checked(&set));
+}
+
 #[test]
 fn a_promise_of_sides_is_broken_by_a_mesh_without() {
     let text = "spacing_min = 2.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";

@@ -27,8 +27,13 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         if subject.terms.sides == Sides::Unknown {
             return result.lacks(super::UNKNOWN_SIDES);
         }
-        check_alone(subject.tree(), &subject.inputs, subject.manifest, result);
-        return result.requires(some_leaves(subject));
+        let (inputs, manifest) = (&subject.inputs, subject.manifest);
+        check_alone(subject.tree(), inputs, manifest, result);
+        let is_sought = inputs.deletes_enclosed() && manifest.tree == Kind::Final;
+        let is_compared = manifest.components.is_some() || is_sought && result.note.is_empty();
+        let none = !is_compared && inputs.seeds.is_empty();
+        let why = || "neither seeds nor counts of components are stated".to_owned();
+        return result.requires(some_leaves(subject).or_else(|| none.then(why)));
     };
     result.examined = subject.examined_with(truth);
     let terms = &subject.terms;

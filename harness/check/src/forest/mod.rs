@@ -204,11 +204,15 @@ pub fn diff(a: &Forest, b: &Forest) -> [CheckResult; 2] {
         connectivity.report(format!("the {field} of the connectivities differ"));
     }
     leaves.examined = a.leaves.iter().map(|leaves| leaves.len() as u64).sum();
-    let place = |leaf: &Quadrant| (leaf.corner, leaf.level);
+    // Versions of p4est differ in the length of a tree.
+    let [in_a, in_b] = [a, b].map(|forest| {
+        let scale = LENGTH / forest.length();
+        move |leaf: &Quadrant| (leaf.corner.map(|at| i64::from(at) * scale), leaf.level)
+    });
     for tree in 0..a.leaves.len().max(b.leaves.len()) {
         let [of_a, of_b] =
             [a, b].map(|forest| forest.leaves.get(tree).map_or(&[][..], Vec::as_slice));
-        let pairs = of_a.iter().map(place).zip(of_b.iter().map(place));
+        let pairs = of_a.iter().map(&in_a).zip(of_b.iter().map(&in_b));
         let same = pairs.take_while(|(a, b)| a == b).count();
         if same < of_a.len().max(of_b.len()) {
             let name = |leaves: &[Quadrant]| match leaves.get(same) {

@@ -259,8 +259,7 @@ impl Mesh<'_> {
         let (side, decision, rule) = match self.body?.component_at(base) {
             Some(component) => (component.side, self.decision(component), self.deletion(component)),
             None => {
-                let deletes =
-                    "keep_crossing is false, so crossing leaves are deleted after gradation";
+                let deletes = "keep_crossing is false: crossing leaves are deleted after gradation";
                 let rule = if self.inputs.keep_crossing { LOST } else { deletes };
                 (Side::Crossing, that_cross(&self.facets_of(base)), format!("section 7: {rule}"))
             }

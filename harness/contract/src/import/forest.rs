@@ -227,8 +227,7 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64)> {
     let tree_to_face = input.numbers(trees, faces)?;
     let attributes = input.items(trees, attribute_bytes)?.to_vec();
     // p4est writes no offsets of edges in two dimensions.
-    let edge_lists =
-        if dimension == 3 { input.lists(edges, edge_trees)? } else { Lists::default() };
+    let by_edge = if dimension == 3 { input.lists(edges, edge_trees)? } else { Lists::default() };
     let corner_lists = input.lists(corners, corner_trees)?;
     let connectivity = Connectivity {
         dimension,
@@ -237,7 +236,7 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64)> {
         tree_to_vertex,
         tree_to_tree,
         tree_to_face,
-        edges: Lists { of_tree: tree_to_edge, ..edge_lists },
+        edges: Lists { of_tree: tree_to_edge, ..by_edge },
         corners: Lists { of_tree: tree_to_corner, ..corner_lists },
         attributes,
     };

@@ -210,8 +210,7 @@ impl<'a> Space<'a> {
         let mut queue = BinaryHeap::new();
         labels[start as usize] = ((width(self, start) as f32).min(cap), 0.0);
         // The bit patterns of floats that are not negative are in the order of the floats.
-        let key =
-            |(least, cost): (f32, f32), cell| (least.to_bits(), Reverse(cost.to_bits()), cell);
+        let key = |(low, cost): (f32, f32), cell| (low.to_bits(), Reverse(cost.to_bits()), cell);
         queue.push(key(labels[start as usize], start));
         let mut joined = Vec::new();
         while let Some((least, Reverse(cost), cell)) = queue.pop() {

@@ -183,7 +183,7 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
     let series = vec![line, runs("fitted runs", 0, seen), runs("held-out runs", 1, later)];
     let caption = format!(
         "Run time of {}, {} cells, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: laws of exact counters, and a cost of \
-         each by phase. The band has the width that held 90 % of such predictions in retrospect. Projected with {}.",
+         each by phase. Up to {fitted} ranks the band has the width that held 90 % of such predictions in retrospect; beyond, it is widened by the distance. Projected with {}.",
         described(subject, of),
         grouped(cells),
         range(of, |g| g.setup.ranks as u64),

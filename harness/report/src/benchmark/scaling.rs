@@ -215,7 +215,8 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
         let phase = g.typical.phases.iter().find(|p| p.name == name);
         phase.map_or(0.0, |p| phase_s(&g.typical, p, &g.network)) * g.setup.ranks as f64
     };
-    let mut names: Vec<&str> = last.typical.phases.iter().map(|p| p.name.as_str()).collect();
+    let phases = simulated.iter().rev().flat_map(|g| &g.typical.phases);
+    let mut names = distinct(phases.map(|phase| phase.name.as_str()));
     let time_max = |name: &str| simulated.iter().map(|g| time(g, name)).fold(0.0, f64::max);
     names.sort_by(|a, b| time_max(b).total_cmp(&time_max(a)));
     let segment = |(style, (label, names)): (usize, (&str, &[&str]))| {
@@ -266,8 +267,8 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let [kind, ending] = if is_sim { ["simulated ranks", ""] } else { ["ranks", "-mpi"] };
     let caption = format!(
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} {kind}, by the partitioner of the base \
-         tree and the weights of its leaves. Base leaves have an automatic depth, but for the paper's partition (paper), in the root of this case, \
-         which is ours. The counts repeat exactly."
+         tree and the weights of its leaves. Base leaves have an automatic depth, but for the paper's partition (paper), at depth 7 in the root of this case, \
+         which is ours: the speedups that the paper states may exclude that root. The counts repeat exactly."
     );
     let names = of.iter().map(|g| g.setup.division()).collect();
     let id = format!("balance-{}-{label}-{ranks}{ending}", subject.file());

@@ -116,7 +116,7 @@ fn runs_of_several_nodes_are_pooled_and_the_nodes_counted() {
     let groups = Groups::of(&[on("1", "a"), of("1"), on("2", "b"), of("2"), on("3", "a")]);
     assert_eq!((groups.all.len(), groups.all[0].runs.len()), (1, 2));
     let [note] = &groups.notes[..] else { panic!("{:?}", groups.notes) };
-    assert_eq!(note, "runs of 2 nodes are taken for those of one machine");
+    assert_eq!(note, "runs on 2 lists of nodes are taken for one machine's");
     assert!(Groups::of(&[on("1", "a"), of("1"), on("3", "a")]).notes.is_empty());
 }
 
@@ -200,7 +200,7 @@ fn a_session_has_its_own_network() {
     lines.push(of("2", ran()));
     assert_eq!(found(&lines), [(2.0, 1), (10.0, 1)], "a network that was given is another series");
     lines.extend([of_machine("3", "cpu"), of("3", network(2.0, true)), of("3", ran())]);
-    assert_eq!(found(&lines), [(2.0, 2), (10.0, 1)]);
+    assert_eq!(found(&lines), [(3.0, 2), (10.0, 1)], "all repetitions with the last network");
 }
 
 proptest! {
