@@ -348,14 +348,21 @@ class Foam:
         return begins, vertices
 
 
-def refuse_newer(at):
-    """Of a case, the mesh in `constant` may be the one that another was made of."""
-    written = (at / "faces").stat().st_mtime
-    times = at.parent.parent.glob("[0-9]*/polyMesh/faces")
-    parts = (file for file in at.parent.parent.glob("processor*/*/polyMesh/faces") if file.stat().st_mtime > written)
-    others = sorted(str(file.parent) for file in itertools.chain(times, parts))
+def cells_noted(mesh):
+    """The number of cells that a mesh notes at the head of its owners, which OpenFOAM writes; 0 if it does not."""
+    with open(mesh / "owner", "rb") as owner:
+        noted = re.search(rb"nCells:\s*(\d+)", owner.read(4096))
+    return int(noted[1]) if noted else 0
+
+
+def refuse_others(at):
+    """The mesh in the directory `constant` of a case may be the one that another was made of, in a directory of a time or in those of processors."""
+    times = [file.parent for file in at.parent.parent.glob("[0-9]*/polyMesh/faces*")]
+    parts = [file.parent for file in at.parent.parent.glob("processor*/constant/polyMesh/owner")]
+    is_whole = sum(map(cells_noted, parts)) in (0, cells_noted(at))
+    others = sorted(map(str, times + ([] if is_whole else parts)))
     if others:
-        raise Refused(f"has a newer mesh than {at}, {others[-1]}: give the directory polyMesh that is meant, and reconstruct a decomposed mesh")
+        raise Refused(f"has another mesh than {at}, {others[-1]}: give the directory polyMesh that is meant, and reconstruct a decomposed mesh")
 
 
 def openfoam(path, request):
@@ -363,8 +370,8 @@ def openfoam(path, request):
     at = pathlib.Path(path)
     points = Foam(at / "points").points()
     begins, vertices = Foam(at / "faces").faces(len(points))
-    if request.get("is_case"):
-        refuse_newer(at.resolve())
+    if request.get("is_case") and at.resolve().parent.name == "constant":
+        refuse_others(at.resolve())
     faces = len(begins) - 1
     # A cell has at least four faces, and a face at most two cells.
     owners, neighbours = (Foam(at / name).labels(faces // 2 + 1) for name in ("owner", "neighbour"))

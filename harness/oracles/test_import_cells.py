@@ -3,9 +3,9 @@ python -m unittest discover harness/oracles"""
 
 import itertools
 import json
-import os
 import pathlib
 import random
+import re
 import resource
 import shutil
 import subprocess
@@ -214,17 +214,30 @@ class CellsTest(unittest.TestCase):
             self.assertIn("has an empty field in line", self.refused(self.table(text)))
         read(self.table("x,y,z,level,\n0,0,0,0,\n"), root=root_of([0, 0, 0, 1]))
 
-    def test_a_case_with_a_newer_mesh_is_refused(self):
+    def test_a_case_with_another_mesh_is_refused(self):
         copy = self.edited("foam-ascii", "points", lambda content: content)
+        asked = {"sides": None, "is_case": True}
+
+        def with_cells(mesh, count):
+            shutil.copytree(copy, mesh)
+            owner = (copy / "owner").read_text()
+            self.assertRegex(owner, r"nCells:\s*\d+")
+            (mesh / "owner").write_text(re.sub(r"nCells:\s*\d+", f"nCells: {count}", owner))
+            return str(mesh)
+
         for case, other in (("time", "2/polyMesh"), ("parallel", "processor1/constant/polyMesh")):
-            mesh = shutil.copytree(copy, self.at / case / "constant/polyMesh")
-            asked = {"sides": None, "is_case": True}
-            import_cells.openfoam(str(mesh), asked)
-            newer = shutil.copytree(copy, self.at / case / other) / "faces"
-            os.utime(newer, (newer.stat().st_atime, (mesh / "faces").stat().st_mtime + 1))
-            with self.assertRaisesRegex(Refused, f"has a newer mesh than .*{other}"):
-                import_cells.openfoam(str(mesh), asked)
-            import_cells.openfoam(str(mesh), asked | {"is_case": False})
+            mesh = with_cells(self.at / case / "constant/polyMesh", 8)
+            import_cells.openfoam(mesh, asked)
+            newer = with_cells(self.at / case / other, 9)
+            with self.assertRaisesRegex(Refused, f"has another mesh than .*{other}"):
+                import_cells.openfoam(mesh, asked)
+            import_cells.openfoam(mesh, asked | {"is_case": False})
+            import_cells.openfoam(newer, asked) if case == "time" else None
+        # As decomposePar leaves it.
+        mesh = with_cells(self.at / "whole/constant/polyMesh", 8)
+        for part in (3, 5):
+            with_cells(self.at / f"whole/processor{part}/constant/polyMesh", part)
+        import_cells.openfoam(mesh, asked)
 
     def test_sides_of_an_openfoam_mesh_are_a_list_of_labels(self):
         copy = self.edited("foam-ascii", "cellLevel", lambda content: content)

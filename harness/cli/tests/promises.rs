@@ -261,6 +261,10 @@ fn a_promise_about_nothing_is_not_kept() {
         &CASE.replace("[0.0, 0.0, 0.0]\nmax = [3.0", "[40.0, 0.0, 0.0]\nmax = [43.0"),
     );
     nothing("boxes = true", "no leaf meets a box of the case");
+    // A box in a hole.
+    fixture.write("case.toml", CASE);
+    npy::write(&fixture.path("right.npy"), &words(&[])[1..]).unwrap();
+    nothing("boxes = true", "no leaf meets a box of the case");
     fixture.write("case.toml", &CASE.replace("keep = \"all\"", "keep_crossing = false"));
     // The deleted leaves of T0 at the surface are finer.
     npy::write(&fixture.path("right.npy"), &[word::encode(Octant::ROOT, Side::Outside)]).unwrap();

@@ -23,11 +23,7 @@ pub struct Format {
 /// All formats.
 pub const FORMATS: &[Format] = &[
     Format { ending: ".vtu", purpose: "cells for ParaView, VisIt and pyvista", write: vtu::write },
-    Format {
-        ending: ".p8est",
-        purpose: "a forest for p8est_load of p4est up to 2.2",
-        write: p8est::write,
-    },
+    Format { ending: ".p8est", purpose: "a forest for p8est_load of p4est", write: p8est::write },
     Format {
         ending: "/polyMesh",
         purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",

@@ -1,4 +1,4 @@
-//! Forests for `p8est_load` of p4est up to 2.2. Later versions have coordinates of other units, and refuse them.
+//! Forests for `p8est_load` of p4est: of 2.2 and versions before, and, if their names end in [`FINE`], of those since mid-2020.
 //!
 //! The file is that of `p8est_save`: the connectivity of one tree, whose vertices are the corners of the root; the header; and
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
@@ -24,6 +24,8 @@ use crate::options::{Export, Summary, Written};
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
+/// How names of forests end whose coordinates are in units of 2^-30 of the root (`P8EST_MAXLEVEL` since mid-2020).
+const FINE: &[u8] = b".30.p8est";
 /// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
 const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
@@ -36,6 +38,7 @@ const VERSION: &[u8] = b"2.2";
 /// the user interrupts.
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let leaves = export.count()?;
+    let shift = if path.as_os_str().as_encoded_bytes().ends_with(FINE) { 11 } else { 0 };
     let start = |quadrants: u64| {
         let mut bytes = connectivity(&export.mesh.manifest.root);
         // Format; bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; ranks; the ends of the only
@@ -54,8 +57,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         quadrants(export, &mut |octant, data| {
             count += 1;
             written.add(&octant, data != FILLER);
-            let Octant { corner: [x, y, z], level } = octant;
-            out.write_all(bytemuck::bytes_of(&[x, y, z, level.into()])).map_err(named)?;
+            let [x, y, z] = octant.corner.map(|at| at << shift);
+            out.write_all(bytemuck::bytes_of(&[x, y, z, octant.level.into()])).map_err(named)?;
             out.write_all(&[data]).map_err(named)
         })?;
         written.check_invariants(leaves);
@@ -63,7 +66,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root";
+    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; p4est since mid-2020 loads names that end in .30.p8est, and no others";
     let notes = vec![format!("{} {what}", count - leaves)];
     Ok(Summary { leaves, bytes, notes })
 }
@@ -191,6 +194,12 @@ mod tests {
             let set = import(&path, true);
             prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
             prop_assert_eq!(set.manifest.root, ROOT);
+            // Most quadrants are octants of a tree of the other length.
+            let fine = dir.path().join("forest.30.p8est");
+            write(&export(&mesh, &Selection::default()), &fine).unwrap();
+            prop_assert_eq!(&import(&fine, true).words, &words);
+            let differ = fs::read(&fine).unwrap() != fs::read(&path).unwrap();
+            prop_assert_eq!(differ, words.len() > 1);
             prop_assert_eq!(set.words, words);
             let complete = import(&path, false);
             let filled: u64 = complete.words.iter().map(|&w| word::span(word::level(w))).sum();

@@ -195,9 +195,7 @@ impl Claim {
     /// If another run has claimed it or it is not empty, of the kind `DirectoryNotEmpty`; or if it cannot be created or written to.
     pub fn create(path: &Path, last: &str, others: Vec<String>) -> io::Result<Self> {
         let why = match Self::begin(path, last, others, Self::make) {
-            Err(Errno::EXIST) => {
-                "another run is writing to this directory, or was killed while it did"
-            }
+            Err(Errno::EXIST) => "another run is writing to this directory, or was killed doing so",
             Err(Errno::NOTEMPTY) => "the directory is not empty",
             claim => return Ok(claim?),
         };

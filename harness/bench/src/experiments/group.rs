@@ -38,11 +38,12 @@ pub struct Group {
 impl Group {
     /// Groups the repetitions of one setup; `None` for no repetitions.
     fn of(setup: Setup, repetitions: &[&(Run, Network)]) -> Option<Self> {
-        let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &of.1);
+        let network = repetitions.last()?.1;
+        let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &network);
         let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
         let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
         let nearest = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
-        let (mut typical, network) = (nearest.0.clone(), repetitions.last()?.1);
+        let mut typical = nearest.0.clone();
         let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
@@ -209,8 +210,8 @@ impl Groups {
                 Entry::Network(_) => {}
             }
         }
-        let groups = by_key(&runs, |(run, _)| (run.setup.clone(), run.oversubscribed)).into_iter();
-        let all: Vec<Group> = groups.filter_map(|((of, _), runs)| Group::of(of, &runs)).collect();
+        let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
+        let all: Vec<Group> = by_setup.filter_map(|(setup, of)| Group::of(setup, &of)).collect();
         let is_of = |g: &Group, s: &Setup| (&g.setup.engine, &g.setup.case) == (&s.engine, &s.case);
         let as_named = |(at, session, setup, why): (usize, &String, &Setup, String)| {
             let of_runs = |is_same: &dyn Fn(&Setup) -> bool| {

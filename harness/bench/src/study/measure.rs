@@ -128,7 +128,7 @@ fn peak(run: &Group) -> Result<f64, String> {
 }
 
 fn reported(memory: Option<statistics::Median>) -> Result<f64, String> {
-    memory.map(|median| median.value).ok_or("the program does not report its memory".to_owned())
+    memory.map(|median| median.value).ok_or("no memory of each rank is reported".to_owned())
 }
 
 fn lambda_cells(run: &Group) -> Result<f64, String> {
@@ -238,7 +238,7 @@ mod tests {
         // A program that does not report it is within no bound.
         let unknown = with(1000, &[0.0, 0.0]);
         for name in ["peak_bytes", "bytes_per_cell"] {
-            assert!(value(name, &[&unknown], None).unwrap_err().contains("does not report"));
+            assert!(value(name, &[&unknown], None).unwrap_err().contains("no memory of each rank"));
         }
         let alone = with(200, &[150.0]);
         assert!(value("bytes_per_cell_beyond", &[&fine], Some(&alone)).is_err());

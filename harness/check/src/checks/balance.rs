@@ -25,7 +25,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         None => (subject.tree_with_deleted(), (Touching::Corner, 1)),
     };
     touching_leaves(tree, &subject.terms.root, required, result);
-    result.requires(several_levels(subject, tree));
+    result.requires(several_levels(tree));
 }
 
 /// Leaves that touch in this way differ by at most `levels` levels.

@@ -40,7 +40,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         None => check_holes(tree, terms, result),
     }
     if subject.case.is_none() {
-        result.requires(some_leaves(subject));
+        result.requires(some_leaves(subject.tree_with_deleted()));
     }
 }
 

@@ -33,7 +33,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         let is_compared = manifest.components.is_some() || is_sought && result.note.is_empty();
         let none = !is_compared && inputs.seeds.is_empty();
         let why = || "neither seeds nor counts of components are stated".to_owned();
-        return result.requires(some_leaves(subject).or_else(|| none.then(why)));
+        return result
+            .requires(some_leaves(subject.tree_with_deleted()).or_else(|| none.then(why)));
     };
     result.examined = subject.examined_with(truth);
     let terms = &subject.terms;

@@ -43,8 +43,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let has_extra = !terms.keep_crossing && tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
     let none = is_balance && !has_extra;
     let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
-    let missing = some_leaves(subject).or_else(|| none.then(why));
-    result.requires(missing.or_else(|| several_levels(subject, tree)));
+    let missing = some_leaves(subject.tree_with_deleted()).or_else(|| none.then(why));
+    result.requires(missing.or_else(|| several_levels(tree)));
 }
 
 fn check_layers(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {

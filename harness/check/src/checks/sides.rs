@@ -39,7 +39,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let Some(truth) = subject.truth() else {
         let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
         let alike = || (kinds.count_ones() == 1).then(|| "all leaves have one side".to_owned());
-        return result.requires(some_leaves(subject).or_else(alike));
+        return result.requires(some_leaves(subject.tree_with_deleted()).or_else(alike));
     };
     let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
     truth.compare(subject.tree(), &mut |found| {

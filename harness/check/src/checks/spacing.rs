@@ -15,7 +15,7 @@ use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leave
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
-use contract::tree::{Builder, DELETED, Kind, Tree};
+use contract::tree::{Builder, DELETED, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
 pub(super) const CHECK: Check =
@@ -29,7 +29,7 @@ pub(super) const BOXES: Check = Check {
         let (tree, terms) = (subject.tree(), &subject.terms);
         boxes_met(tree, terms, result);
         let is_met = |octant: &Octant, _| terms.boxes.iter().any(|extent| extent.meets(octant));
-        tree.walk_where(is_met, &mut |_, _| result.examined += 1);
+        tree.walk_where(is_met, &mut |_, at| result.examined += u64::from(at != Handle::HOLE));
         let none = "no leaf meets a box of the case";
         result.needs_objects(if terms.lacks_inputs { UNKNOWN_INPUTS } else { none });
     },
@@ -46,7 +46,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let kinds = tree.kinds(tree.root());
     let without = kinds & 1 << Side::Crossing as u8 == 0 && terms.boxes.is_empty();
     let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
-    result.requires(some_leaves(subject).or_else(|| without.then(uncrossed)));
+    result.requires(some_leaves(subject.tree_with_deleted()).or_else(|| without.then(uncrossed)));
 }
 
 /// Every leaf that meets a box has at least the level of the box.

@@ -134,6 +134,7 @@ fn a_service_that_is_interrupted_at_the_end_of_a_run_begins_no_other() {
     signal(&["TERM"], service.stopped());
     let finished = service.finish();
     assert_eq!((finished.code, finished.stdout.as_str()), (Some(130), "0\n"), "{finished:?}");
+    assert_eq!(finished.stderr, "mesher: interrupted\n");
     assert!(workspace.path().join("run.json").exists());
     assert!(!workspace.path().join("other.json").exists());
 }
