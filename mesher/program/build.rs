@@ -15,7 +15,8 @@ fn commit() -> Option<String> {
     let log = git(&["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])?;
     println!("cargo::rerun-if-changed={log}");
     // Uncommitted changes of what the mesher or the harness is made of make the work tree dirty.
-    for part in ["Cargo.toml", "Cargo.lock", "mesher", "geometries", "harness", "reference"] {
+    println!("cargo::rerun-if-changed=..");
+    for part in ["Cargo.toml", "Cargo.lock", "mesher", "geometries", "harness/vtkhdf"] {
         println!("cargo::rerun-if-changed=../../{part}");
     }
     git(&["describe", "--always", "--dirty", "--abbrev=12"])
