@@ -267,7 +267,7 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let [kind, ending] = if is_sim { ["simulated ranks", ""] } else { ["ranks", "-mpi"] };
     let caption = format!(
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} {kind}, by the partitioner of the base \
-         tree and the weights of its leaves. Base leaves have an automatic depth, but for the paper's partition (paper), at depth 7 in the root of this case, \
+         tree and the weights of its leaves. Base leaves have an automatic depth, but for the paper's partition (paper), in the root of this case, \
          which is ours: the speedups that the paper states may exclude that root. The counts repeat exactly."
     );
     let names = of.iter().map(|g| g.setup.division()).collect();
