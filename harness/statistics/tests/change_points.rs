@@ -73,6 +73,26 @@ fn independent_noise_of_any_kind_rarely_has_a_step() {
     }
 }
 
+/// As a counter has that depends on timing, and a time that is rounded.
+#[test]
+fn noise_of_few_values_has_no_step_and_hides_none() {
+    for (rare, count) in [(20, 80), (10, 40), (10, 80), (5, 40)] {
+        let noise =
+            |seed| independent(count, seed, |random| f64::from(u8::from(random.below(rare) == 0)));
+        let rate = alarms(noise);
+        assert!(rate <= 1.0, "one in {rare} of {count}: {rate} %");
+        let found = |seed: &u64| {
+            let mut values = noise(*seed);
+            values[count - 8..].iter_mut().for_each(|value| *value += 2.0);
+            matches!(places(&values)[..], [at] if at.abs_diff(count - 8) <= 1)
+        };
+        let found = (0..50).filter(found).count();
+        assert!(found >= 47, "one in {rare} of {count}: {found} of 50");
+    }
+    let rate = alarms(|seed| independent(40, seed, |random| (normal(random) / 2.0).round()));
+    assert!(rate <= 1.0, "rounded: {rate} %");
+}
+
 #[test]
 fn autocorrelated_noise_is_no_sequence_of_steps() {
     for count in [30, 100] {
