@@ -198,7 +198,7 @@ impl Generator {
         }
     }
 
-    /// A dimension of the table or its default, checked to be positive and finite.
+    /// A dimension of the table or its default, checked to be positive and finite in single precision.
     pub(crate) fn dimension(
         &self,
         key: &'static str,
@@ -206,13 +206,14 @@ impl Generator {
         default: f64,
     ) -> Result<f64, GeneratorError> {
         let value = given.unwrap_or(default);
-        if value.is_finite() && value > 0.0 {
+        // Vertices are written in single precision.
+        if (value as f32).is_normal() && value > 0.0 {
             return Ok(value);
         }
         Err(GeneratorError::InvalidDimension {
             key,
             value,
-            requirement: "must be positive and finite".into(),
+            requirement: "must be positive and finite in single precision".into(),
         })
     }
 

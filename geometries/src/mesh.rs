@@ -118,6 +118,20 @@ impl Mesh {
         }
     }
 
+    /// The least distance of the plane of a facet from the origin.
+    pub(crate) fn least_distance(&self) -> f64 {
+        let distance = |t: &[u32; 3]| {
+            let [p, q, r] = t.map(|v| self.vertices[v as usize]);
+            let normal: [f64; 3] = std::array::from_fn(|a| {
+                let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+                (q[b] - p[b]) * (r[c] - p[c]) - (q[c] - p[c]) * (r[b] - p[b])
+            });
+            let dot = |v: [f64; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
+            dot(p).abs() / dot(normal).sqrt()
+        };
+        self.triangles.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+
     /// The first facet that has no area after rounding to f32, or whose edges are not finite.
     pub(crate) fn flat_facet(&self) -> Option<usize> {
         let has_area = |t: &[u32; 3]| {

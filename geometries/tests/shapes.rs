@@ -266,7 +266,10 @@ fn invalid_tables_are_refused_with_the_reason() {
         ("shape = 'sphere'\nfacets = 100\nradius = inf", "must be positive and finite"),
         ("shape = 'sphere'\nfacets = 100\ncentre = [0, inf, 0]", "must be finite"),
         ("shape = 'torus'\nfacets = 100\nradius_tube = 1", "less than radius"),
-        ("shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5", "less than radius"),
+        ("shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5", "request more facets"),
+        ("shape = 'nested_spheres'\nfacets = 300\nradius_inner = 0.495", "request more facets"),
+        ("shape = 'pipes_crossing'\nfacets = 1200\nlength = 0.2", "must exceed the width"),
+        ("shape = 'cube'\nfacets = 200\nedge = 5e-324", "must be positive and finite"),
         ("shape = 'pipe'\nfacets = 100\nradius_bend = 0.1", "must exceed radius"),
         ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
         ("shape = 'pipes_crossing'\nfacets = 200\nangle = 60", "no dimension `angle`"),
@@ -274,7 +277,7 @@ fn invalid_tables_are_refused_with_the_reason() {
         ("shape = 'sphere'\nfacets = 99999999999999", "at most 100000000"),
         ("shape = 'uav'\nfacets = 100000001", "at most 100000000"),
         ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area in f32"),
-        ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area in f32"),
+        ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "must be positive and finite"),
     ] {
         let message = refusal(text);
         assert!(message.contains(reason), "{text}\n{message}");

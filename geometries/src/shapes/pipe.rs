@@ -17,6 +17,11 @@ pub(super) fn pipe(of: &Generator) -> Result<Mesh, GeneratorError> {
 /// middle of the last section of the first pipe, half a radius above it.
 pub(super) fn pipes_crossing(of: &Generator) -> Result<Mesh, GeneratorError> {
     let line = CentreLine::of(of)?;
+    if line.straight <= 2.0 * line.radius {
+        let requirement = format!("must exceed the width of the other pipe, {}", 2.0 * line.radius);
+        let (key, value) = ("length", line.straight);
+        return Err(GeneratorError::InvalidDimension { key, value, requirement });
+    }
     let mut mesh = line.draw_finest(of.facets / 2);
     let mut second = mesh.clone();
     let along = line.radius_bend + line.straight * 0.5;
