@@ -5,6 +5,9 @@ use mesher::input::lattice::Keep;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::panic::catch_unwind;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+use std::{process, thread};
 
 /// Numbers of cases by what they have.
 #[derive(Debug, Default)]
@@ -21,13 +24,33 @@ pub struct Counts {
     ranks: BTreeMap<usize, u64>,
 }
 
+/// The case that is tried.
+static TRIED: AtomicU64 = AtomicU64::new(0);
+/// No case takes as long.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// Ends the program when a case takes too long, which no other limit would find.
+fn watch() {
+    loop {
+        let number = TRIED.load(Ordering::Relaxed);
+        thread::sleep(LIMIT);
+        if TRIED.load(Ordering::Relaxed) == number {
+            eprintln!("case {number} takes longer than {} s", LIMIT.as_secs());
+            process::exit(1);
+        }
+    }
+}
+
 /// Tries the cases from `first` on. The case of a number is that of the target `whole-case` with the number's eight bytes, the lowest first.
 ///
 /// # Errors
 /// The number of the first case that found a fault, whose message has been printed.
 pub fn run(first: u64, count: u64) -> Result<Counts, u64> {
     let mut counts = Counts::default();
+    TRIED.store(first, Ordering::Relaxed);
+    thread::spawn(watch);
     for number in first..first.saturating_add(count) {
+        TRIED.store(number, Ordering::Relaxed);
         let tried = catch_unwind(|| whole_case::tried(&number.to_le_bytes())).or(Err(number))?;
         counts.add(&tried);
     }

@@ -16,11 +16,7 @@ static PATHS: LazyLock<Paths> = LazyLock::new(Paths::find);
 /// An engine file, with its promises.
 pub(super) fn engine(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let path = scratch.file("engine.toml", bytes);
-    let description = Description::find(&path.to_string_lossy(), &PATHS);
-    if let Ok(engine) = &description {
-        assert_eq!(engine.promises.fault(), None);
-    }
-    description.is_ok()
+    Description::find(&path.to_string_lossy(), &PATHS).is_ok()
 }
 
 /// The rules of `harness gate`.
@@ -47,12 +43,7 @@ pub(super) fn record(scratch: &mut Scratch, bytes: &[u8]) -> bool {
 
 /// A history of `harness track`.
 pub(super) fn history(scratch: &mut Scratch, bytes: &[u8]) -> bool {
-    let records = history::read(scratch.file("history.jsonl", bytes));
-    if let Ok(history) = &records {
-        let series = history.records.iter().flat_map(|record| record.metrics.keys()).count();
-        assert!(series <= bytes.len());
-    }
-    records.is_ok_and(|history| !history.records.is_empty())
+    history::read(scratch.file("history.jsonl", bytes)).is_ok_and(|h| !h.records.is_empty())
 }
 
 /// The reports of a run and of `harness gate`.

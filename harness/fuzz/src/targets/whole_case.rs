@@ -80,7 +80,7 @@ pub(crate) fn tried(bytes: &[u8]) -> Tried {
     let mut runner = TestRunner::new_with_rng(Config::default(), rng);
     let drawn = DRAWN.with(|drawn| drawn.new_tree(&mut runner));
     let (case, run) = drawn.expect("no value is rejected").current();
-    let whole = seed[0] % WHOLE == 1;
+    let whole = seed[1] % WHOLE == 1;
     if seed[0] % UNGRADED == 0 {
         compared(&case, &run, true, whole);
     }
@@ -91,7 +91,8 @@ pub(crate) fn tried(bytes: &[u8]) -> Tried {
 /// The mesh of a case by the reference, which the mesher's on one rank and on simulated ranks equal.
 fn compared(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Outcome> {
     let wanted = case.try_reference_outcome(ungraded);
-    let wanted = wanted.ok().map(|outcome| Meshed {
+    let refused = |error| assert!(is_of_seeds(&error), "{case:?}\n{error}");
+    let wanted = wanted.map_err(refused).ok().map(|outcome| Meshed {
         reported: whole.then(|| {
             let digest = reference::digest(&outcome.words);
             (reference::leaves::hex(digest), outcome.words.len() as u64)
@@ -115,11 +116,15 @@ fn compared(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Outc
 fn meshed(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Meshed> {
     let case = Rc::new(case.mesher_case());
     let options = mesher::Options { check: whole, ..support::options(run.division, ungraded) };
-    match run.ranks {
+    let mesh = match run.ranks {
         1 => merge(vec![part(&case, &options, whole, &Solo)]),
         ranks => on_ranks(case, options, ranks, Adversary::new(run.seed), whole, plain),
-    }
-    .ok()
+    };
+    mesh.inspect_err(|error| assert!(error.to_string().starts_with("seed "), "{error}")).ok()
+}
+
+fn is_of_seeds(error: &reference::Error) -> bool {
+    matches!(error, reference::Error::SeedOutside { .. } | reference::Error::SeedCrossing { .. })
 }
 
 fn words(mesh: &Option<Meshed>) -> &[u64] {
