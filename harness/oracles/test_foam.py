@@ -210,6 +210,14 @@ class RunTest(RunCase):
         self.assertGreater(np.ptp(values(self.at / "heat/case/1/T", "scalar", 1)), 0.1)
 
 
+    def test_the_fields_of_a_result_on_ranks_are_joined(self):
+        """A viewer shows the fields of the case, not those of its processors."""
+        (self.at / "duct.toml").write_text(self.case)
+        code, _, error = self.run_with("duct.toml", "-", "joined", "--inlet", "yMin", "--outlet", "yMax", "--ranks", "2")
+        self.assertEqual(code, 0, error)
+        self.assertGreater(np.ptp(values(self.at / "joined/case/0/Phi", "scalar", 1)), 3)
+
+
 @needs("harness", "mesher")
 class StandInTest(RunCase):
     """Other programs in the place of OpenFOAM's."""
