@@ -110,24 +110,19 @@ impl From<io::Error> for Failure {
 /// Whether the user has interrupted the program.
 pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The user of this program: steps are a line on standard error, which is empty at first, only if that is a terminal.
-pub struct Progress;
-
-impl Progress {
-    /// A step begins. One without a name removes the line.
-    pub fn step(&self, what: &str) {
-        if stderr().is_terminal() {
-            let _ = write!(stderr().lock(), "\r\x1b[K{what}");
-        }
+/// A step begins, which a terminal shows as the line of standard error that is empty at first. One without a name removes the line.
+pub fn progress(what: &str) {
+    if stderr().is_terminal() {
+        let _ = write!(stderr().lock(), "\r\x1b[K{what}");
     }
+}
 
-    /// Whether to continue.
-    ///
-    /// # Errors
-    /// If the user has interrupted the program.
-    pub fn check(&self) -> Result<(), Failure> {
-        if INTERRUPTED.load(Ordering::SeqCst) { Err(Failure::interrupted()) } else { Ok(()) }
-    }
+/// Whether to continue.
+///
+/// # Errors
+/// If the user has interrupted the program.
+pub fn uninterrupted() -> Result<(), Failure> {
+    if INTERRUPTED.load(Ordering::SeqCst) { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
 #[cfg(test)]

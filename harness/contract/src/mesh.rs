@@ -8,7 +8,7 @@
 
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::{Failure, Progress, Result};
+use crate::failure::{Failure, Result, uninterrupted};
 use crate::htg::{Block, TreeError, TreeFile};
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
@@ -146,7 +146,7 @@ impl Mesh {
     pub fn leaves(&self, takes: &dyn Fn(&Octant) -> bool, visit: Each<'_>) -> Result<()> {
         let (mut index, mut digest) = (0u64, Digest::default());
         self.visit(&mut |part, blocks| {
-            Progress.check()?;
+            uninterrupted()?;
             for block in blocks {
                 let (rank, side) = (part as u32, word::side(block.first));
                 if takes(&block.octant()) {

@@ -7,7 +7,7 @@
 use std::io::BufWriter;
 use std::path::Path;
 
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, uninterrupted};
 use contract::files;
 use contract::lattice::Root;
 use contract::tree::{Builder, Handle, Kind, Tree};
@@ -43,7 +43,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let mut out = TreeWriter::new(out, shape.clone()).map_err(named)?;
         let mut deflater = Deflater::default();
         for index in 0..shape.windows() {
-            Progress.check()?;
+            uninterrupted()?;
             let mut window = Window::new(index);
             if index == 0 {
                 window.put_root(siblings(&[tree.root()]));

@@ -12,7 +12,7 @@
 
 use crate::options::Export;
 use crate::points::Point;
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, uninterrupted};
 use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word;
@@ -141,7 +141,7 @@ impl Leaves {
 
     fn descend(&self, around: &Around, squares: &mut Vec<Square>, visit: Visit) -> Result<()> {
         if let Content::Cell(number) = around.content {
-            Progress.check()?;
+            uninterrupted()?;
             self.squares(around, squares);
             visit(number, &around.octant, squares);
         }

@@ -16,7 +16,7 @@ use crate::jsonl;
 use check::promises::Independence;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, uninterrupted};
 use run::engine::interrupt;
 use run::engine::layout::Launcher;
 use run::engine::runner::Programs;
@@ -168,7 +168,7 @@ impl Session<'_> {
             self.make(points)?;
         }
         for (row, number) in study.row.iter().zip(1..) {
-            Progress.check()?;
+            uninterrupted()?;
             let judged = self.row(row)?;
             let [name, target, value, how, verdict] = judged.fields();
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");

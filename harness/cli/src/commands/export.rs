@@ -2,7 +2,7 @@
 
 use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure, Progress, Result};
+use contract::failure::{EXIT_HOLDS, Failure, Result, progress};
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS};
 use export::options::{Export, Regions, Summary};
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         script,
     };
     let written = (format.write)(&export, file);
-    Progress.step("");
+    progress("");
     let Summary { leaves, bytes, notes } = written?;
     let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
     let per_cell = bytes as f64 / leaves as f64;

@@ -4,7 +4,7 @@ use crate::options::{Input, Output, examples, point, whole_seconds};
 use crate::output::put_forms;
 use clap::Args;
 use contract::case::Case;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Progress, Result};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Result, progress, uninterrupted};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::PlainCase;
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             vec![(leaks.seed(to)?.ok_or_else(|| format!("the case has no seeds: {START}"))?, to)]
         }
         (None, None) => {
-            Progress.step("meshing the base tree of the case");
+            progress("meshing the base tree of the case");
             let tree = tree(case.level_surface)?;
             let leaked = leaked(&case, &tree)?;
             of_case.set(Some(tree.words));
@@ -89,8 +89,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         }
     };
     let answers = leaks.answers(&ends)?;
-    Progress.step("");
-    Progress.check()?;
+    progress("");
+    uninterrupted()?;
     if ends.is_empty() {
         println!(
             "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it (not examined, but for --from: a region that is open at all three, and surroundings of the body that are inside, of which the mesher warns)",

@@ -87,14 +87,15 @@ pub fn guess(path: &Path) -> Result<Format> {
              --format leaf-words";
         Failure::unless(!path.join(manifest::part_name(0)).is_file(), why)?;
         poly_mesh(path).map(|_| Format::Openfoam)
-    } else if path.ends_with(manifest::FILE) {
-        return Err(Failure::input("is the manifest of a leaf set: give its directory"));
     } else if let Some("toml" | "stl" | "STL") = path.extension().and_then(|e| e.to_str()) {
         return Err(Failure::input("is a case file or a geometry by its name: give a mesh"));
     } else {
         let mut head = Vec::new();
         let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
         read.map_err(Failure::unreadable)?;
+        // A mesh of discretize may have this name.
+        let is_mesh = !path.ends_with(manifest::FILE) || head.windows(8).any(|w| w == b"TreeMesh");
+        Failure::unless(is_mesh, "is the manifest of a leaf set: give its directory")?;
         of_content(&head)
     };
     format.ok_or_else(|| Failure::input(unknown))
@@ -179,6 +180,10 @@ mod tests {
             fs::write(&path, "{}").unwrap();
             assert!(guess(&path).unwrap_err().to_string().contains(why), "{name}");
         }
+        let path = place.path().join(manifest::FILE);
+        fs::write(&path, "{\"__module__\": \"discretize.tree_mesh\", \"__class__\": \"TreeMesh\"")
+            .unwrap();
+        assert_eq!(guess(&path).unwrap(), Format::Discretize);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use contract::word;
 
 use super::Mesh;
 use crate::points::to_user;
-use contract::failure::{Progress, Result};
+use contract::failure::{Result, uninterrupted};
 
 impl Mesh {
     /// Writes the files into a directory, with labels of 64 bits if they are wide, and else of 32.
@@ -106,7 +106,7 @@ impl ListFile {
         let [begin, end] = if n == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{n}\n{begin}")?;
         for item in items {
-            Progress.check()?;
+            uninterrupted()?;
             self.out.write_all(bytemuck::bytes_of(&item))?;
         }
         Ok(writeln!(self.out, "{end}")?)

@@ -20,7 +20,7 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, uninterrupted};
 use contract::files::{Staging, nearest_directory};
 use contract::number::numbered;
 use contract::sets::Sets;
@@ -66,7 +66,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     for file in fs::read_dir(&dir).map_err(named)? {
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
-    Progress.check()?;
+    uninterrupted()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));
         moved.and_then(|()| fs::rename(&dir, path)).map_err(named)

@@ -19,7 +19,7 @@ mod tests;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, uninterrupted};
 use contract::files::fill_atomically;
 use contract::lattice::Root;
 use contract::number::number;
@@ -151,7 +151,7 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
         out.flush().map_err(|error| Failure::at(path, error))?;
-        Progress.check()
+        uninterrupted()
     })?;
     let closed = match open {
         0 => "closed".to_owned(),

@@ -17,7 +17,7 @@ use contract::lattice::Root;
 use contract::manifest::Sides;
 
 use crate::options::{Export, Summary};
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, progress, uninterrupted};
 use piece::{Encoder, Piece};
 
 /// Maximum number of leaves in a piece.
@@ -72,8 +72,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
             piece.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
             data_bytes += piece.bytes.len() as u64;
             pieces.push(Piece { bytes: Vec::new(), ..piece });
-            Progress.step(&format!("{} %", 100 * encoder.written.cells / leaves));
-            Progress.check()
+            progress(&format!("{} %", 100 * encoder.written.cells / leaves));
+            uninterrupted()
         };
         export.selection.visit(mesh, &mut |leaf| {
             if encoder.leaves.len() == PIECE {
@@ -88,7 +88,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
-        Progress.check()
+        uninterrupted()
     })?;
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }

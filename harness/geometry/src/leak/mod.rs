@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, progress};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Leak;
 use contract::word::{self, Side};
@@ -104,7 +104,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
             report.closes = self.coarsen(ends, outside, finest)?;
             for measured in level.min(finest + 2)..=level {
                 self.make_tree(measured)?;
-                Progress.step("measuring the width");
+                progress("measuring the width");
                 let outside = outside.map(|level| &self.trees[&level][..]);
                 let words = &self.trees[&measured];
                 let space = Space::new(words, &self.facets, outside)?;
@@ -133,7 +133,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
 
     fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
-            Progress.step(&format!("meshing the base tree of level {level}"));
+            progress(&format!("meshing the base tree of level {level}"));
             self.trees.insert(level, (self.make)(level)?);
         }
         Ok(())
@@ -163,7 +163,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     /// The level of the finest leaves on the path that joins the ends through the coarsest free leaves of a base tree; none if no path does.
     /// The ends lie in free leaves. The far field is what is `outside` at that level, if there is one.
     fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<Option<u8>> {
-        Progress.step(&format!("searching the base tree of level {level}"));
+        progress(&format!("searching the base tree of level {level}"));
         let outside = outside.map(|level| &self.trees[&level][..]);
         let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();

@@ -9,7 +9,7 @@ use std::iter::successors;
 
 use super::{Ends, leaf_at};
 use crate::tree::{FacetTree, Point};
-use contract::failure::{Progress, Result};
+use contract::failure::{Result, uninterrupted};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, KEY_END, Order, Side};
@@ -224,7 +224,7 @@ impl<'a> Space<'a> {
                 path.reverse();
                 return Ok(Some((path, label.0)));
             }
-            Progress.check()?;
+            uninterrupted()?;
             joined.clear();
             self.neighbours(cell, &mut joined);
             for &next in &joined {

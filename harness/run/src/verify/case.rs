@@ -12,7 +12,7 @@ use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
 use contract::catalogue::Selected;
-use contract::failure::Progress;
+use contract::failure::progress;
 use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.
@@ -87,7 +87,7 @@ impl<'a> CaseRun<'a> {
 
     /// Shows what begins.
     pub fn step(&self, what: &str) {
-        Progress.step(&format!("{}: {what}", self.selected.name));
+        progress(&format!("{}: {what}", self.selected.name));
     }
 
     /// Adds a check of a run with this layout or of serial ones, and with the first failed check the command that repeats it.

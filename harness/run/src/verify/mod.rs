@@ -16,7 +16,7 @@ use crate::engine::interrupt;
 use crate::engine::runner::Programs;
 use case::CaseRun;
 use contract::catalogue::Selected;
-use contract::failure::{Failure, Progress, Result};
+use contract::failure::{Failure, Result, progress};
 use contract::files::publications;
 use options::{Needs, Options};
 use report::{Asked, CaseReport, Report};
@@ -51,7 +51,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let begun = selected.iter().take_while(|_| !interrupt::requested());
     let cases = begun.map(|case| verification.case(case)).collect::<Result<Vec<_>>>()?;
     let Verification { needs, workplace, .. } = verification;
-    Progress.step("");
+    progress("");
     let interrupted = interrupt::requested();
     workplace.close(cases.iter().any(|case| case.kept.is_some()));
     let engine = &programs.engine.description;
