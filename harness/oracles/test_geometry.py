@@ -1,13 +1,10 @@
 """Compares the counts of `harness geometry` with those of trimesh and pymeshlab on the geometries in this repository.
 
-Run with: python -m unittest discover harness/oracles. The binary is target/debug/harness or target/release/harness,
-whichever is newer, or the one that the environment variable HARNESS names.
+Run with: python -m unittest discover harness/oracles
 """
 
 import json
-import os
 import pathlib
-import subprocess
 import tempfile
 import unittest
 
@@ -23,33 +20,16 @@ try:
 except ImportError:
     pymeshlab = None
 
-REPO = pathlib.Path(__file__).resolve().parents[2]
-
-
-def binary():
-    """The harness, or None if it is not built or does not have the command."""
-    named = os.environ.get("HARNESS")
-    target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", REPO / "target"))
-    built = [target / profile / "harness" for profile in ("debug", "release")]
-    candidates = [pathlib.Path(named)] if named else [path for path in built if path.exists()]
-    if not candidates:
-        return None
-    newest = max(candidates, key=lambda path: path.stat().st_mtime)
-    has_command = subprocess.run([newest, "geometry", "--help"], capture_output=True).returncode == 0
-    return newest if has_command else None
-
-
-HARNESS = binary()
+from built import ROOT, needs, run
 
 
 def diagnose(path):
     """The diagnosis, and the counts of its findings by kind."""
     with tempfile.TemporaryDirectory() as directory:
         out = pathlib.Path(directory) / "geometry.json"
-        command = [HARNESS, "geometry", path, "--json", out]
-        run = subprocess.run(command, capture_output=True, text=True)
-        if run.returncode not in (0, 1):
-            raise AssertionError(f"{path}: exit code {run.returncode}: {run.stderr}")
+        code, _, error = run("harness", "geometry", path, "--json", out)
+        if code not in (0, 1):
+            raise AssertionError(f"{path}: exit code {code}: {error}")
         diagnosis = json.loads(out.read_text())
     return diagnosis, {finding["kind"]: finding for finding in diagnosis["findings"]}
 
@@ -80,11 +60,11 @@ def components(mesh):
 
 
 @unittest.skipIf(trimesh is None, "trimesh is not installed")
-@unittest.skipIf(HARNESS is None, "the harness is not built, or is older than the command geometry")
+@needs("harness")
 class GeometryTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        paths = sorted(REPO.glob("geometries/*.stl")) + sorted(REPO.glob("geometries/fetched/*.stl"))
+        paths = sorted(ROOT.glob("geometries/*.stl")) + sorted(ROOT.glob("geometries/fetched/*.stl"))
         cls.cases = [(path.name, *diagnose(path), *load(path)) for path in paths]
         assert cls.cases, "no geometries"
 
@@ -122,7 +102,7 @@ class GeometryTest(unittest.TestCase):
     def test_counts_agree_with_pymeshlab(self):
         """pymeshlab drops facets with a repeated vertex. It counts an edge with three facets three times, so only whether
         there are edges with more than two facets is compared."""
-        for path in sorted(REPO.glob("geometries/*.stl")) + sorted(REPO.glob("geometries/fetched/*.stl")):
+        for path in sorted(ROOT.glob("geometries/*.stl")) + sorted(ROOT.glob("geometries/fetched/*.stl")):
             with self.subTest(path.name):
                 _, diagnosis, _, _, facets, repeats = next(c for c in self.cases if c[0] == path.name)
                 meshes = pymeshlab.MeshSet()

@@ -1,5 +1,5 @@
 """An oct-tree mesher on discretize.TreeMesh: every cell that a facet crosses has the surface level, 2:1 balance over
-corners, no layers. README.md describes it as an engine."""
+corners, no layers. ../README.md describes it as an engine."""
 
 import sys
 import tomllib

@@ -1,4 +1,4 @@
-/* Facets of an STL file that the harness writes, binary or ASCII for small bodies; and whether a cube and any of many facets share a point. */
+/* Facets of a binary STL file, which is what the harness writes; and whether a cube and any of many facets share a point. */
 #ifndef FACETS_H
 #define FACETS_H
 
@@ -43,28 +43,18 @@ static struct facets read_stl(const char *path)
     uint32_t count = 0;
     if (length >= 84)
         memcpy(&count, bytes + 80, sizeof count);
-    bool binary = length == 84 + 50 * (size_t) count;
-    /* A vertex takes at least 16 characters as text. */
-    struct facets facets = {malloc((binary ? 3 * (size_t) count : length / 16) * 3 * sizeof(double) + 1), 0};
+    if (length != 84 + 50 * (size_t) count)
+        fail(EXIT_INPUT, "%s is no binary STL file", path);
+    struct facets facets = {malloc((size_t) count * 9 * sizeof(double) + 1), count};
     if (facets.vertices == NULL)
         fail(EXIT_INPUT, "not enough memory for the facets of %s", path);
-    size_t vertices = 0;
-    if (binary)
-        for (; vertices < 3 * (size_t) count; ++vertices) {
-            float values[3];
-            memcpy(values, bytes + 84 + 50 * (vertices / 3) + 12 + 12 * (vertices % 3), sizeof values);
-            for (int a = 0; a < 3; ++a)
-                facets.vertices[vertices][a] = values[a];
-        }
-    else
-        for (char *at = bytes; (at = strstr(at, "vertex")) != NULL; ++vertices) {
-            at += strlen("vertex");
-            /* The nearest single-precision number, as a binary file would have it. */
-            for (int a = 0; a < 3; ++a)
-                facets.vertices[vertices][a] = strtof(at, &at);
-        }
+    for (size_t i = 0; i < 3 * (size_t) count; ++i) {
+        float values[3];
+        memcpy(values, bytes + 84 + 50 * (i / 3) + 12 + 12 * (i % 3), sizeof values);
+        for (int a = 0; a < 3; ++a)
+            facets.vertices[i][a] = values[a];
+    }
     free(bytes);
-    facets.count = vertices / 3;
     return facets;
 }
 

@@ -10,7 +10,7 @@
  * These are the least distances that promise layers of n cells, because every octant within reach of a facet is split
  * whatever the other octants do. FOREST is the file of p8est_save; FILE receives the run report.
  *
- * Exit codes: 0 success, 2 the case cannot be read or is not supported, 4 the result could not be written.
+ * Exit codes: 0 success, 1 p4est could not write FOREST, 2 the case cannot be read or is not supported, 4 FILE could not be written.
  */
 #define _POSIX_C_SOURCE 200809L
 

@@ -1,5 +1,5 @@
 """Meshes a case with OpenFOAM's blockMesh and snappyHexMesh (castellated mesh only), which the harness reads as it is.
-README.md states the settings and why they are fair."""
+../peers.md states the settings and why they are fair."""
 
 import argparse
 import json
@@ -92,7 +92,7 @@ def run(place, *command):
     """Runs an OpenFOAM program and returns its name, its wall time and its CPU time."""
     cpu_s = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
     wall, cpu = time.perf_counter(), cpu_s()
-    done = subprocess.run(command, cwd=place, env=os.environ | {"WM_PROJECT_DIR": "/usr/share/openfoam", "PWD": str(place)},
+    done = subprocess.run(command, cwd=place, env={"WM_PROJECT_DIR": "/usr/share/openfoam"} | os.environ | {"PWD": str(place)},
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{command[0]} ended with code {done.returncode}:\n{done.stdout[-4000:]}")

@@ -93,7 +93,7 @@ class Mesh:
     """What `mesh.json` states: root, requirements, counts."""
 
     def __init__(self, directory: str | PathLike[str]):
-        self.directory = Path(directory)
+        self.directory = Path(directory).absolute()
         self.manifest = json.loads((self.directory / "mesh.json").read_text())
         parts = [self.directory / part["file"] for part in self.manifest["parts"]]
         if not parts:
