@@ -15,7 +15,7 @@ from rust_parser import Parser
 
 MESHER = Path(__file__).resolve().parents[2] / "mesher"
 WIDTHS = {f"{sign}{width}": width for sign in "iu" for width in (8, 16, 32, 64, 128)} | {"usize": 64}
-ALIASES = {"Level": "u32", "Vector": "[i128;3]"}
+ALIASES = {"Level": "u32", "Vector": "[i64;3]"}
 WITH_AVX512 = re.compile(r"^with_avx512! \{\n(.*?\bfn [^{]*)\{\n.*?^    \} else (\{\n.*?^    \}\n)\}", re.M | re.S)
 
 

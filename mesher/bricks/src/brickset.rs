@@ -234,6 +234,9 @@ impl BrickSet {
     /// If one is violated; the message names it and a key.
     pub fn check_invariants(&self) {
         assert_eq!(self.low.len(), self.bits.len(), "each key must have bits");
+        if self.is_empty() {
+            return assert!(self.runs.is_empty(), "an empty set must have no runs");
+        }
         let ascend = self.runs.is_sorted_by(|a, b| a.start < b.start);
         assert!(ascend, "each run must have a brick");
         let (mut same, mut before) = (Self::default(), None);

@@ -73,10 +73,11 @@ fn bounds(f: &Facet, axis: usize) -> Range<i64> {
     c[0].min(c[1]).min(c[2])..c[0].max(c[1]).max(c[2])
 }
 
-type Vector = [i128; 3];
+type Vector = [i64; 3];
 
 fn dot(a: Vector, b: Vector) -> i128 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    let product = |i: usize| i128::from(a[i]) * i128::from(b[i]);
+    product(0) + product(1) + product(2)
 }
 
 fn cross(a: Vector, b: Vector) -> Vector {
@@ -93,12 +94,12 @@ fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
     if (0..3).any(apart) {
         return false;
     }
-    let v = f.v.map(|p| [0, 1, 2].map(|a| i128::from(p[a]) - i128::from(min[a])));
+    let v = f.v.map(|p| [0, 1, 2].map(|a| i64::from(p[a]) - min[a]));
     let edges = [0, 1, 2].map(|i| [0, 1, 2].map(|a| v[(i + 1) % 3][a] - v[i][a]));
     let meet = |axis: Vector| {
         let at = v.map(|p| dot(axis, p));
-        let reach =
-            |sign: i128| axis.iter().map(|c| (sign * c).max(0)).sum::<i128>() * i128::from(h);
+        let sum = |sign: i64| axis.iter().map(|c| (sign * c).max(0)).sum::<i64>();
+        let reach = |sign: i64| i128::from(sum(sign)) * i128::from(h);
         at.iter().any(|x| *x <= reach(1)) && at.iter().any(|x| *x >= -reach(-1))
     };
     let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];

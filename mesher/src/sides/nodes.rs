@@ -140,15 +140,11 @@ pub struct OpenBrick {
 }
 
 /// The bricks of a level in Morton order: one for each node.
-pub fn open_bricks(
-    tree: &Tree,
-    ownership: &Ownership,
-    l: Level,
-) -> impl Iterator<Item = OpenBrick> {
+pub fn open_bricks(tree: &Tree, owners: &Ownership, l: Level) -> impl Iterator<Item = OpenBrick> {
     let [mut split, mut crossing] = [&tree.split, &tree.crossing].map(|s| s[l as usize].cursor());
     Tree::exists(&tree.split, l).map(move |Brick { key, bits }| {
-        let is_local = !ownership.is_replicated(l) && ownership.owns(l, key);
-        let placement = if is_local { Placement::Local } else { ownership.placement(l, key) };
+        let is_local = !owners.is_replicated(l) && owners.owns(l, key);
+        let placement = if is_local { Placement::Local } else { owners.placement(l, key) };
         if let Placement::Remote(_) = placement {
             return OpenBrick { key, split: 0, open: 0, placement };
         }

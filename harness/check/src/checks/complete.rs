@@ -7,10 +7,9 @@
 //! lack neighbours, for example a crossing leaf among crossing leaves. A promise of less than the definition is judged beyond a
 //! band around the geometry (`super::region`).
 
-use super::contact;
 use super::region::Survey;
 use super::truth::{Found, Truth};
-use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, some_leaves};
+use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, contact, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
 use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Handle, Kind, Tree};

@@ -9,10 +9,9 @@
 //! definition is judged beyond a band around the geometry (`super::region`).
 
 use super::components::{self, Component};
-use super::contact;
 use super::region::Survey;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, some_leaves};
+use super::{Check, CheckResult, Subject, contact, some_leaves};
 use crate::oracle::is_closed;
 use contract::case::Case;
 use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};

@@ -35,7 +35,8 @@ impl Isometry {
     pub fn gluing(dimension: usize, faces: [usize; 2], corners: [usize; 2]) -> Option<Self> {
         let [face, its] = faces;
         let beyond = across(face).map(|edges| i64::from(edges) * LENGTH);
-        let [from, onto] = [0, 1].map(|i| face_corner(dimension, faces[i], corners[i]));
+        let low = |i: usize| low_corner(dimension, faces[i] / 2, corners[i]);
+        let [from, onto] = [0, 1].map(|i| point(low(i) + ((faces[i] & 1) << (faces[i] / 2))));
         let all = ORDERS.into_iter().flat_map(|to| {
             let reversed = |bits: usize| [0, 1, 2].map(|axis| bits >> axis & 1 == 1);
             (0..8).map(move |bits| Self { to, is_reversed: reversed(bits), shift: [0; 3] })
@@ -77,11 +78,6 @@ pub fn point(corner: usize) -> [i64; 3] {
 /// The corner of a tree that a point is.
 pub fn corner_at(point: [i64; 3]) -> usize {
     (0..3).filter(|&axis| point[axis] == LENGTH).map(|axis| 1 << axis).sum()
-}
-
-/// A corner of a face, numbered within it.
-fn face_corner(dimension: usize, face: usize, number: usize) -> [i64; 3] {
-    point(low_corner(dimension, face / 2, number) + ((face & 1) << (face / 2)))
 }
 
 /// The directed edge from a corner to a neighbouring one.

@@ -70,7 +70,9 @@ impl Mesh<'_> {
 
     /// Whether an octant is deep, or justified, which is sought once.
     fn remembered(&self, octant: &Octant, deep: bool, seek: impl Fn() -> bool) -> bool {
-        let id = word::key_of(octant.corner) << 6 | u64::from(octant.level) << 1 | u64::from(deep);
+        // The bits of an octant's path after a one: the hash needs low bits that differ.
+        let path = (1 << 57 | word::key_of(octant.corner)) >> (3 * (LEVEL_MAX - octant.level));
+        let id = path << 1 | u64::from(deep);
         if let Some(&known) = self.known.borrow().get(&id) {
             return known;
         }
