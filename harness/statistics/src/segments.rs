@@ -49,8 +49,7 @@ impl Fit {
 impl<'a> Series<'a> {
     /// Prepares a series for noise with autocorrelation `phi`, from 0 to below 1.
     pub fn new(values: &'a [f64], phi: f64) -> Self {
-        let mut sums = Vec::with_capacity(values.len().max(1));
-        let mut last = [0.0; 5];
+        let (mut sums, mut last) = (Vec::with_capacity(values.len().max(1)), [0.0; 5]);
         sums.push(last);
         for i in 1..values.len() {
             let (z, time) = (values[i] - phi * values[i - 1], i as f64 - phi * (i as f64 - 1.0));
@@ -68,10 +67,8 @@ impl<'a> Series<'a> {
         let [z, zz, t, tt, tz]: Sums = std::array::from_fn(|k| last[k] - first[k]);
         let (weight, gain) = (1.0 - self.phi * self.phi, 1.0 - self.phi);
         let (y, time, rest) = (self.values[from], from as f64, (until - from - 1) as f64);
-        let ones = weight + rest * gain * gain;
-        let values = weight * y + gain * z;
-        let squares = weight * y * y + zz;
-        let level = values / ones;
+        let (ones, values) = (weight + rest * gain * gain, weight * y + gain * z);
+        let (squares, level) = (weight * y * y + zz, values / ones);
         let constant = Fit { cost: (squares - values * level).max(0.0), level, slope: 0.0 };
         if mean == Mean::Constant {
             return constant;

@@ -36,8 +36,7 @@ impl Sum {
         places.sort_by(f64::total_cmp);
         places.dedup();
         let [_, .., before, last] = places[..] else { return None };
-        let all = Products::of(rows);
-        let count = kinds.iter().max().map_or(0, |last| last + 1);
+        let (all, count) = (Products::of(rows), kinds.iter().max().map_or(0, |last| last + 1));
         if most >= count {
             return Some(Self::of_terms(&all, (0..kinds.len()).collect()));
         }
