@@ -5,6 +5,7 @@ use crate::process::{INPUT, Workspace, refused, run};
 use crate::support::{Run, Small, closed, config, first_difference, small, soup, thin};
 use bricks::digest::{Digests, hex, mix};
 use contract::htg::TreeFile;
+use contract::npy::PartFile;
 use mesher::output::write::{Output, TREE};
 use mesher::partition::Partitioner;
 use mesher::record::Recorder;
@@ -21,16 +22,9 @@ const CASE: &str = "spacing_min = 0.07\nlayer_cells_min = 2\nkeep = \"inside\"\n
 [[box]]\nmin = [-9.0, 0.0, 0.1]\nmax = [0.25, 0.5, 0.4]\nspacing = 0.03\n
 [[box]]\nmin = [-0.3, -0.3, -0.3]\nmax = [0.3, 0.3, 0.3]\nspacing = 0.2\n";
 
-/// The words of a part. Asserts that it has the format that all programs expect: one dimension of
-/// little-endian u64.
+/// The words of a part.
 fn read_part(path: &Path) -> Vec<u64> {
-    let bytes = std::fs::read(path).expect("the part was written");
-    let file = npyz::NpyFile::new(&bytes[..]).expect("it is an .npy file");
-    assert_eq!(file.shape().len(), 1);
-    assert_eq!(file.dtype().descr(), "'<u8'");
-    let count = file.shape()[0] as usize;
-    let words: Vec<u64> = file.into_vec().expect("words");
-    assert_eq!(words.len(), count);
+    let words = PartFile::open(path).and_then(|part| part.read_all()).expect("a part was written");
     assert!(words.is_sorted_by(|a, b| a < b), "a part is sorted and has no leaf twice");
     words
 }
