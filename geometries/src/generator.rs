@@ -198,7 +198,7 @@ impl Generator {
         }
     }
 
-    /// A dimension of the table or its default, checked to be positive and finite in single precision.
+    /// A dimension of the table or its default, checked to be positive and a normal number in single precision.
     pub(crate) fn dimension(
         &self,
         key: &'static str,
@@ -213,7 +213,7 @@ impl Generator {
         Err(GeneratorError::InvalidDimension {
             key,
             value,
-            requirement: "must be positive and finite in single precision".into(),
+            requirement: "must be from 1.2e-38 to 3.4e38".into(),
         })
     }
 

@@ -209,7 +209,6 @@ class RunTest(RunCase):
         self.assertEqual({path.name for path in (self.at / "heat/case/0").iterdir()}, {"T"})
         self.assertGreater(np.ptp(values(self.at / "heat/case/1/T", "scalar", 1)), 0.1)
 
-
     def test_the_fields_of_a_result_on_ranks_are_joined(self):
         """A viewer shows the fields of the case, not those of its processors."""
         (self.at / "duct.toml").write_text(self.case)

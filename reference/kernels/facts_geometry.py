@@ -196,7 +196,7 @@ def rays_checked(k):
 
 @fact(CHECK_SPLITS, ("axis.iter().map(|c| (sign * c).max(0))", "axis.iter().map(|c| (sign * c * c).max(0))"))
 def facets_checked(k):
-    """The second test of facets against octants, `touches`: its terms are below 2^93 and fit i128, for all facets and octants."""
+    """The second test of facets against octants, `touches`: its terms are below 2^93 and fit their types, for all facets and octants."""
     f, corner, h = k.facet(k.integer), [k.integer("i64", 0, ROOT) for _ in AXES], k.integer("i64", 1, ROOT)
     k.paths("touches", f, corner, h, file=CHECK_SPLITS)
     yield k.largest() < 1 << 93

@@ -99,6 +99,13 @@ pub(super) fn sphere(of: &Generator) -> Result<Mesh, GeneratorError> {
 pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     let radius = of.dimension("radius", of.radius, 0.5)?;
     let radius_inner = of.dimension("radius_inner", of.radius_inner, radius * 0.5)?;
+    let invalid = |requirement| {
+        let (key, value) = ("radius_inner", radius_inner);
+        Err(GeneratorError::InvalidDimension { key, value, requirement })
+    };
+    if radius_inner >= radius {
+        return invalid(format!("must be less than radius = {radius}"));
+    }
     // Facets have about the same size on both spheres.
     let (outer, inner) = (radius * radius, radius_inner * radius_inner);
     let facets_inner = ((of.facets as f64 * (inner / (outer + inner))) as usize).max(20);
@@ -108,11 +115,9 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     // Facets lie nearer to the centre than their vertices, on either sphere.
     let least = mesh.least_distance();
     if radius_inner >= least {
-        let requirement = format!(
+        return invalid(format!(
             "must be less than {least}, where the facets of the outer sphere are nearest to the centre (request more facets)"
-        );
-        let (key, value) = ("radius_inner", radius_inner);
-        return Err(GeneratorError::InvalidDimension { key, value, requirement });
+        ));
     }
     mesh.append(&inside);
     Ok(mesh)

@@ -18,7 +18,7 @@ struct facets {
     size_t count;
 };
 
-/* The bytes of a file, with a terminating zero. */
+/* The bytes of a file. */
 static char *read_file(const char *path, size_t *length)
 {
     FILE *file = fopen(path, "rb");
@@ -27,11 +27,10 @@ static char *read_file(const char *path, size_t *length)
     fseek(file, 0, SEEK_END);
     long size = ftell(file);
     rewind(file);
-    char *bytes = size < 0 ? NULL : malloc((size_t) size + 1);
+    char *bytes = size < 0 ? NULL : malloc((size_t) size);
     if (bytes == NULL || fread(bytes, 1, (size_t) size, file) != (size_t) size)
         fail(EXIT_INPUT, "%s cannot be read", path);
     fclose(file);
-    bytes[size] = '\0';
     *length = (size_t) size;
     return bytes;
 }

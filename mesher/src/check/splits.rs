@@ -85,7 +85,7 @@ fn cross(a: Vector, b: Vector) -> Vector {
 }
 
 /// Whether the closed facet and the closed cube with minimum corner `min` and edge `h` share a point: no separating axis exists.
-/// The terms are below 2^93.
+/// The terms are below 2^93, and those of an axis below 2^60.
 fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
     let apart = |a: usize| {
         let extent = bounds(f, a);

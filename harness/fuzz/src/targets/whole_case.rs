@@ -80,7 +80,7 @@ pub(crate) fn tried(bytes: &[u8]) -> Tried {
     let mut runner = TestRunner::new_with_rng(Config::default(), rng);
     let drawn = DRAWN.with(|drawn| drawn.new_tree(&mut runner));
     let (case, run) = drawn.expect("no value is rejected").current();
-    let whole = seed[1] % WHOLE == 1;
+    let whole = seed[0] / UNGRADED % WHOLE == 1;
     if seed[0] % UNGRADED == 0 {
         compared(&case, &run, true, whole);
     }
