@@ -232,8 +232,8 @@ fn without_outliers(values: &[f64]) -> (Vec<f64>, f64) {
         (of.iter().zip(&middles).map(|(x, m)| (x - m).powi(2)).sum::<f64>() / n as f64).sqrt()
     };
     let returns = |&i: &usize| values[i] != values[i - 1] && values[..i - 1].contains(&values[i]);
-    let returns = (2..n).filter(returns).count();
-    let is_noisy = typical == 0.0 && returns > if n < 20 { 2 } else { 3 };
+    let most = if n < 20 { 2 } else { 3 };
+    let is_noisy = typical == 0.0 && (2..n).filter(returns).nth(most).is_some();
     let limit = OUTLIER * if is_noisy { deviation(values) } else { typical };
     if limit == 0.0 {
         let mut clean = values.to_vec();
