@@ -39,7 +39,7 @@ def ask(oracle, points, facets):
         np.asarray(points, "<f8").tofile(directory / "points")
         write_stl(directory / "body.stl", facets)
         question = json.dumps([str(directory / name) for name in ("points", "body.stl", "sides")])
-        command = [sys.executable, HERE / "sides.py", oracle]
+        command = [sys.executable, "-B", HERE / "sides.py", oracle]
         ended = subprocess.run(command, input=f"[]\n{question}\n", check=True, capture_output=True, text=True)
         # A question that fails costs only itself.
         assert ended.stdout == "1\n0\n", ended

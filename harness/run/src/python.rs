@@ -34,7 +34,7 @@ pub fn run<A: AsRef<OsStr>>(
     process::run(command.args(arguments), &Watch::new(name, limit, place)).map_err(explained)
 }
 
-/// The command of a script without arguments.
+/// The command of a script without arguments. NumPy starts a thread per core for products of matrices, which none has.
 fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Failure> {
     let (python, script) = (&paths.python, paths.root.join("harness/oracles").join(script));
     let required = [
@@ -45,7 +45,7 @@ fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Fa
         return Err(Failure::new(name, End::Missing(format!("needs {what}"))));
     }
     let mut command = Command::new(python);
-    command.arg("-B").arg(&script);
+    command.arg("-B").arg(&script).env("OPENBLAS_NUM_THREADS", "1");
     Ok(command)
 }
 
