@@ -1,4 +1,4 @@
-//! Forests for `p8est_load` of p4est: of 2.2 and versions before, and, if their names end in [`FINE`], of those since mid-2020.
+//! Forests for `p8est_load` of p4est: of 2.2 and versions before, and, if their names end in `.30.p8est`, of those since mid-2020.
 //!
 //! The file is that of `p8est_save`: the connectivity of one tree, whose vertices are the corners of the root; the header; and
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
