@@ -71,16 +71,20 @@ const P_MIN: f64 = 1e-9;
 
 /// Returns the steps of a series in ascending order. `alpha` is the greatest probability of a step in a series without one.
 pub fn change_points(values: &[f64], alpha: f64) -> Vec<Change> {
-    let size = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-    if values.len() < VALUES_MIN || size == 0.0 || !size.is_finite() {
+    let largest = |of: &[f64]| of.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    let all = largest(values);
+    if values.len() < VALUES_MIN || all == 0.0 || !all.is_finite() {
         return Vec::new();
     }
     let middle = median_of(values);
-    let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / size).collect();
+    let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / all).collect();
     let (clean, noise) = without_outliers(&scaled);
+    // Beside an outlier like 2^64, all steps are small.
+    let kept = largest(&clean).max(middle.abs() / all);
+    let (size, clean) = (all * kept, clean.iter().map(|value| value / kept).collect::<Vec<_>>());
     let least = EFFECT_MIN * middle.abs() / size;
     // The variance below which noise is not distinguished from none.
-    let mut model = Model::select(&clean, (least / 4.0).max(1e-9).max(noise).powi(2));
+    let mut model = Model::select(&clean, (least / 4.0).max(1e-9).max(noise / kept).powi(2));
     let p_values = model.steps(least, alpha);
     let (edges, fits) = (model.edges(), model.fits(&Series::new(&clean, model.phi)));
     let is_level = model.mean == Mean::Constant;

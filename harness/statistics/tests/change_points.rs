@@ -159,6 +159,18 @@ fn several_steps_are_separated_and_outliers_are_not_steps() {
 }
 
 #[test]
+fn an_outlier_beyond_all_others_hides_no_step() {
+    for outlier in [1e10, 1e12, u64::MAX as f64] {
+        let values = [vec![1000.0; 20], vec![outlier], vec![1000.0; 20], vec![1010.0; 10]].concat();
+        assert_eq!(places(&values), [41], "{outlier}");
+        let mut noisy = independent(60, 7, normal);
+        noisy[30..].iter_mut().for_each(|value| *value *= 1.1);
+        noisy[10] = outlier;
+        assert_eq!(places(&noisy), [30], "{outlier}");
+    }
+}
+
+#[test]
 fn a_step_within_a_drift_is_found() {
     let mut values = independent(80, 5, normal);
     values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.5 * i as f64);
