@@ -25,7 +25,7 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     // These two already advise to enlarge the root.
     let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
     let others = [
-        (flow_at_boundary, FLOW_AT_BOUNDARY),
+        (flow_at_boundary && leaks.as_deref() != Some(FLOW_AT_BOUNDARY), FLOW_AT_BOUNDARY),
         (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
@@ -48,13 +48,14 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let Mesh { rules, facets, sides, .. } = mesh;
         let empty = empty_region(rules.keep, &sides.summary);
-        // Nothing but an opening joins what surrounds all facets with what rays take for the inside.
-        let is_around = rules.seeds.is_empty() && facets.margin > 0;
+        // Nothing but an opening joins what surrounds all facets with what rays, or seeds, take for the inside.
+        let is_around = facets.margin > 0 && sides.summary.inside_reaches_boundary;
         return match mesh.bounds_nothing {
-            _ if is_around && sides.summary.inside_reaches_boundary => Some(format!(
+            _ if is_around && rules.seeds.is_empty() => Some(format!(
                 "the geometry leaks: the space around it is inside, because an opening joins it with that in the body: close what \
                  `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or increase spacing_min"
             )),
+            _ if is_around && rules.keep == Keep::Inside => Some(FLOW_AT_BOUNDARY.to_owned()),
             true => empty.or_else(|| Some(bounds_nothing(rules, case_name))),
             false => empty.filter(|_| rules.keep == Keep::Inside),
         };
@@ -76,11 +77,10 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
 
 fn bounds_nothing(rules: &Rules, case_name: &str) -> String {
     let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
+    let [twice, four_times] = [2.0, 4.0].map(|times| times * spacing);
     format!(
-        "the facets bound no inside at spacings of {spacing}, {} and {}, and are no sheet: close the openings that `harness leak {case_name} \
-         --from X,Y,Z` finds from a point in the body, remove the facets that appear twice (`harness geometry`), or refine a thin body",
-        2.0 * spacing,
-        4.0 * spacing
+        "the facets bound no inside at spacings of {spacing}, {twice} and {four_times}, and are no sheet: close the openings that `harness leak {case_name} \
+         --from X,Y,Z` finds from a point in the body, remove the facets that appear twice (`harness geometry`), or refine a thin body"
     )
 }
 
