@@ -6,6 +6,7 @@ use contract::octant::LEVEL_MAX;
 use serde::Serialize;
 
 use super::input::Input;
+use super::sheets::RESOLVED;
 use super::tree::bounds;
 
 /// Kinds of findings, in the order of the table.
@@ -30,9 +31,9 @@ pub enum Kind {
     Intersections,
     /// Facets with two solids, four, ... on their inner side.
     Overlaps,
-    /// Facets with an opposite facet less than one cell away, on the inner side, but not of another solid; by rays.
+    /// Facets with an opposite facet less than [`sheets::RESOLVED`](super::sheets::RESOLVED) cells away, on the inner side, but not of another solid; by rays.
     ThinWalls,
-    /// Facets with an opposite facet less than one cell away, on the outer side.
+    /// The same on the outer side.
     ThinGaps,
     /// Facets with a coordinate near which f32 numbers are more than half a cell apart.
     Rounded,
@@ -53,8 +54,8 @@ pub struct Place {
     pub at: [f64; 3],
     /// Openings: free width; thin walls and gaps: distance of the facets, which a twentieth of their area undercuts. In the user's units.
     pub width: Option<f64>,
-    /// Openings: whether the width is that of a projection, because the rim is not flat. What passes is narrower or somewhat wider.
-    pub is_projected: bool,
+    /// Openings: whether the width is an upper bound, because the rim is not flat.
+    pub is_bound: bool,
 }
 
 impl Place {
@@ -128,19 +129,19 @@ impl Kind {
             Self::InsideOut => ("closed shells inside out",
                 "No effect, but normals point inward: other programs may exchange inside and outside."),
             Self::Nested => ("closed shells in other shells",
-                "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
+                "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep, a seed lies in it or the root cuts it. Remove the inner shell if it was meant as a solid."),
             Self::Stray => ("facets without area, apart",
                 "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. Remove them."),
             Self::Duplicates => ("duplicate facets",
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Keep one of the copies where the body ends, and none within it: two are a wall in the inside."),
             Self::Intersections => ("intersecting pairs of facets",
-                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Where they touch, there is a wall in the inside. Unite the shells if that is not meant."),
+                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity that the root does not cut. Where they touch, there is a wall in the inside. Unite the shells if that is not meant."),
             Self::Overlaps => ("facets within another solid",
-                "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity. Unite them if that is not meant."),
+                "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity that the root does not cut. Unite them if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
-                "No cell fits into the wall: it consists of crossing leaves, without an inside."),
+                "Into a wall narrower than a cell no cell fits, and into a wider one only in some positions and directions: it may consist of crossing leaves, without an inside."),
             Self::ThinGaps => ("facets at thin gaps",
-                "No cell fits into the gap, so no flow passes. The wedge along the line where two shells intersect is a gap, too."),
+                "Into a gap narrower than a cell no cell fits, and into a wider one only in some positions and directions, so that no flow may pass. The wedge along the line where two shells intersect is a gap, too."),
             Self::Rounded => ("facets with rounded vertices",
                 "Coordinates are f32 numbers, which are more than half a cell apart so far from the origin: the body has steps. Move it to the origin before its vertices are rounded."),
             Self::OutsideRoot => ("facets beyond the root",
@@ -195,13 +196,13 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
             "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
         }
         Kind::Openings if input.cell.is_none() || finding.count_changing == 0 => format!(
-            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest may leak. Where the rim is not flat, the width is that of a projection: harness leak measures what passes. {meaning}",
+            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest may leak. Where the rim is not flat, less may pass than its width: harness leak measures it. {meaning}",
             number(width)
         ),
         // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
         Kind::Openings => format!(
             "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
-             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, the width is that of a projection: harness leak measures what passes. The rim of a sheet counts, too; a sheet has no inside.",
+             depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, less may pass than its width: harness leak measures it. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
         Kind::Duplicates if finding.count_changing == 0 => {
@@ -213,14 +214,12 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         Kind::Intersections if finding.count_changing == 0 => {
             "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
         }
-        // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice; one across its
-        // diagonal has to be 4 / sqrt(3) cells wide.
-        Kind::ThinWalls | Kind::ThinGaps if width * 0.433 < finest => {
+        Kind::ThinWalls | Kind::ThinGaps if width / RESOLVED < finest => {
             format!("{meaning} A twentieth is too narrow for the finest cell of the root.")
         }
         Kind::ThinWalls | Kind::ThinGaps => format!(
             "{meaning} A spacing below {} would resolve all but the narrowest twentieth.",
-            number(width * 0.433)
+            number(width / RESOLVED)
         ),
         _ => meaning.into(),
     }

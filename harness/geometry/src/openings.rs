@@ -5,7 +5,9 @@
 //! pair is left; what remains bounds openings.
 //!
 //! The free width of an opening is the least distance of two parallel lines that enclose its points, projected on the plane that they span.
-//! A ball that is wider does not pass through a flat opening; of another one, as of a slot around a pipe, it is an upper bound.
+//! A ball that is wider does not pass through a flat opening. Of another one, as of a slot around a pipe, it is an upper bound: two points can
+//! go along both sides of the rim, from one end of a direction to the other, and always be in one plane normal to it; a ball that passes
+//! between them is at most as wide as they are far apart, so as the rim seen along that direction.
 
 use contract::lattice::{UNITS_PER_EDGE, sorted};
 use contract::octant::LEVEL_MAX;
@@ -70,8 +72,8 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
         facets.dedup();
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
         let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
-        let (width, is_projected) = free_width(&ends);
-        (Place { width: Some(width), is_projected, ..Place::new(facets, centre) }, extent)
+        let (width, is_bound) = free_width(&ends);
+        (Place { width: Some(width), is_bound, ..Place::new(facets, centre) }, extent)
     };
     labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }
@@ -143,7 +145,7 @@ const ROUNDS: usize = 4;
 /// Depth of a rim across its plane, in widths, from which on it is not flat. The rounding of vertices is less.
 const FLAT: f64 = 1e-3;
 
-/// The free width of a set of at least one point, or slightly more, and whether it is that of a projection, as the points are not in one plane.
+/// The free width of a set of at least one point, the ends of segments in turn, or slightly more, and whether it is an upper bound, as the points are not in one plane.
 fn free_width(points: &[[f64; 3]]) -> (f64, bool) {
     let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
     let farthest = |offset: &dyn Fn(Point) -> Point| {
@@ -175,7 +177,16 @@ fn free_width(points: &[[f64; 3]]) -> (f64, bool) {
         best = tried.fold(best, |best, next| if next.0 < best.0 { next } else { best });
         reach /= f64::from(STEPS);
     }
-    (best.0, extent(u.cross(v)) > FLAT * best.0)
+    if extent(u.cross(v)) <= FLAT * best.0 {
+        return (best.0, false);
+    }
+    let seen_along = |u: Point| {
+        let v = farthest(&|p| (p - from).reject_from_normalized(u)).normalize_or_zero();
+        extent(v).hypot(extent(u.cross(v)))
+    };
+    let segments = points.chunks_exact(2).map(|ends| ends[1] - ends[0]);
+    let longest = segments.max_by(|a, b| a.length().total_cmp(&b.length())).unwrap_or(along);
+    (seen_along(u).min(seen_along(longest.normalize_or(u))), true)
 }
 
 #[cfg(test)]
@@ -262,8 +273,8 @@ mod tests {
                 at.rotate_left(turn);
                 at
             }).collect();
-            let (found, is_projected) = free_width(&points);
-            prop_assert!(!is_projected);
+            let (found, is_bound) = free_width(&points);
+            prop_assert!(!is_bound);
             let expected = if least.is_finite() { least } else { 0.0 };
             let range = expected - 1e-9..=1.04 * expected + 1e-9;
             prop_assert!(range.contains(&found), "{} instead of {}", found, expected);

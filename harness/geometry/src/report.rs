@@ -17,6 +17,7 @@ use std::fmt;
 use super::edges::EdgeCounts;
 use super::finding::{Finding, Kind, Place};
 use super::input::Extent;
+use super::sheets::RESOLVED;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-geometry/6";
@@ -136,8 +137,8 @@ impl Diagnosis {
         };
         let text = format!("\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0);
         writeln!(f, "{}", text.trim_end())?;
-        for Place { facets, facets_more, at, width, is_projected } in places {
-            let about = if *is_projected { "about " } else { "" };
+        for Place { facets, facets_more, at, width, is_bound } in places {
+            let about = if *is_bound { "at most " } else { "" };
             let width = width.map(|width| format!(": {about}{}", self.with_cells(" wide", width)));
             let dots = if *facets_more > 0 { ", ..." } else { "" };
             let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
@@ -172,7 +173,7 @@ impl Finding {
         let widths: Vec<f64> = places.iter().filter_map(|place| place.width).collect();
         assert!(widths.is_sorted_by(|a, b| a >= b), "widths of {kind:?}: {widths:?}");
         if matches!(kind, Kind::ThinWalls | Kind::ThinGaps) {
-            let are_thin = widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w));
+            let are_thin = widths.iter().all(|w| (0.0..=1.000_001 * RESOLVED * cell).contains(w));
             assert!(are_thin, "{widths:?} of {kind:?} in cells of {cell}");
         }
     }
@@ -235,7 +236,7 @@ mod tests {
                 let places = &mut d.findings[openings].places;
                 places.push(Place { width: Some(9.0), ..places[0].clone() });
             }),
-            ("a wall thicker than a cell", &|d| d.findings[walls].places[0].width = Some(5.0)),
+            ("a wall thicker than its limit", &|d| d.findings[walls].places[0].width = Some(9.5)),
         ];
         right.check_invariants();
         for (what, plant) in plants {

@@ -1,6 +1,7 @@
-//! Thin sheets: facets with an opposite one less than one cell away, or one of a finer box there, by rays along their normals.
+//! Thin sheets: facets with an opposite one less than [`RESOLVED`] cells away, or cells of a finer box there, by rays along their normals;
+//! on a side that is not meshed, less than one.
 //!
-//! From points of each facet, a ray leads inward and one outward. The first facet that it meets within a cell is opposite if it has no
+//! From points of each facet, a ray leads inward and one outward. The first facet that it meets as near as that is opposite if it has no
 //! vertex in common with the first one and their normals differ by at least 120 degrees. They are a wall on the inner side and a gap on
 //! the outer side, by the winding of the file, which is reversed in shells that are inside out. Facets of two solids that overlap have inner
 //! sides that face each other, but no wall.
@@ -17,8 +18,15 @@ use super::input::Input;
 use super::shells::Shells;
 use super::tree::{Aabb, FacetTree, Point, TOUCHING};
 
+/// Cells within which a gap holds one of them wherever it lies in the lattice: 2 if it is parallel to a face of the lattice, and this across
+/// its diagonal.
+pub const RESOLVED: f64 = 4.0 / 1.732;
+
 /// The cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
+
+/// Rays on each side per area of the surface, at least: so many for all of it, unless they are a cell apart.
+const STARTS: f64 = 1e5;
 
 /// The quantile of the width that is reported, by area.
 const QUANTILE: f64 = 0.05;
@@ -37,11 +45,12 @@ struct Hit {
 /// Thin walls and thin gaps, each with the place at the quantile of its width.
 pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [Finding; 2] {
     let unit = input.case.root.edge / UNITS_PER_EDGE as f64;
-    let reach = |at: Point| {
+    let cell_at = |at: Point| {
         let at = Point::from(input.case.root.origin) + unit * at;
         input.cell_in(&Aabb::new(at, at)).unwrap_or(cell) / unit
     };
     [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
+        let cells = if kind.changes_region(input) { RESOLVED } else { 1.0 };
         let may_be = |a: u32, b: u32| {
             let facets = [a, b].map(|facet| input.case.facets_lattice[facet as usize]);
             let [p, q] = [a, b].map(|facet| shells.of[facet as usize]);
@@ -50,7 +59,7 @@ pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [F
         };
         let sign = |facet| if shells.outward(facet) == Some(false) { -1.0 } else { 1.0 };
         let normal = |facet: u32| Some(tree.triangle(facet).normal()? * sign(facet));
-        let (mut hits, is_lower_bound) = hits(tree, side, reach, normal, may_be);
+        let (mut hits, is_lower_bound) = hits(tree, (side, cells), cell_at, normal, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
         // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.
         let of_sheets: HashSet<u32> = hits.iter().map(|hit| hit.from).collect();
@@ -64,37 +73,44 @@ pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [F
     })
 }
 
-/// The rays on one side of all facets with an area that meet an opposite facet within `reach`, and whether the search ended before
+/// The rays on one side of all facets with an area that meet an opposite facet within a number of cells, and whether the search ended before
 /// the last facet.
 fn hits(
     tree: &FacetTree,
-    side: f64,
-    reach: impl Fn(Point) -> f64,
+    (side, cells): (f64, f64),
+    cell_at: impl Fn(Point) -> f64,
     normal: impl Fn(u32) -> Option<Point>,
     may_be: impl Fn(u32, u32) -> bool,
 ) -> (Vec<Hit>, bool) {
     let (mut hits, visits) = (Vec::new(), Cell::new(0));
+    let area: f64 = tree.firsts.iter().map(|&facet| tree.triangle(facet).area()).sum();
+    let part = area / STARTS;
     for &facet in &tree.firsts {
-        if visits.get() > tree.visits_max {
-            return (hits, true);
-        }
         let Some(outward) = normal(facet) else { continue };
         let triangle = tree.triangle(facet);
         let [a, b, c] = *triangle.vertices();
-        let centre = (a + b + c) / 3.0;
-        let is_large = triangle.edges().iter().any(|edge| edge.length() > reach(centre));
-        let starts = [centre, centre.midpoint(a), centre.midpoint(b), centre.midpoint(c)];
-        let starts = &starts[..if is_large { starts.len() } else { 1 }];
-        for start in starts {
-            let ray = Ray::new(*start, side * outward);
+        let cell = cell_at((a + b + c) / 3.0);
+        let is_large = triangle.edges().iter().any(|edge| edge.length() > cell);
+        let parts = triangle.area() / part.max(cell * cell);
+        let rows = (parts.sqrt().ceil() as u32).max(if is_large { 2 } else { 1 });
+        // The centres of equal parts, row by row from the first vertex. Every other part is upside down.
+        for (row, at) in (0..rows).flat_map(|row| (0..=2 * row).map(move |at| (row, at))) {
+            if visits.get() > tree.visits_max {
+                return (hits, true);
+            }
+            let turned = f64::from(at % 2);
+            let down = f64::from(row) + (2.0 - turned) / 3.0;
+            let along = f64::from(at / 2) + (1.0 + turned) / 3.0;
+            let start = a + ((down - along) * (b - a) + along * (c - a)) / f64::from(rows);
+            let ray = Ray::new(start, side * outward);
             let is_obstacle = |other: u32| {
                 visits.set(visits.get() + 1);
                 may_be(facet, other)
             };
-            let (first, width) = tree.first_hits(&ray, reach(*start), is_obstacle);
+            let (first, width) = tree.first_hits(&ray, cells * cell_at(start), is_obstacle);
             let faces = |other: &u32| normal(*other).is_some_and(|n| n.dot(outward) <= OPPOSITE);
             if let Some(other) = first.into_iter().find(faces).filter(|_| width > TOUCHING) {
-                let area = triangle.area() / starts.len() as f64;
+                let area = triangle.area() / f64::from(rows * rows);
                 let middle = ray.point_at(width / 2.0);
                 let facets = [facet.min(other), facet.max(other)];
                 hits.push(Hit { width, area, from: facet, facets, middle });
