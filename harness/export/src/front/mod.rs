@@ -126,7 +126,7 @@ fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
 /// Writes the polygons as triangles. Coordinates have single precision.
 ///
 /// # Errors
-/// As [`vtp`], and if the file exists, if there are more than 2^32 triangles, or if single precision does not resolve one.
+/// As [`vtp`], and if the file exists, if there are more than 2^32 triangles, or if single precision moves a corner by more than a hundredth of a face.
 pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary> {
     // Nothing in a surface shows whether it is an export or the body that was meshed.
     require_new(path)?;
@@ -166,6 +166,17 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
 /// The polygons as triangles.
 fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<Facet>> {
     let point = |index: u32| to_user(&points.all[index as usize], root).map(|c| c as f32);
+    let finest = faces.iter().map(|face| root.edge_of(face.square.level)).fold(f64::MAX, f64::min);
+    let is_moved = |c: &f64| (c - f64::from(*c as f32)).abs() > finest / 100.0;
+    if let Some(at) =
+        points.all.iter().map(|at| to_user(at, root)).find(|at| at.iter().any(is_moved))
+    {
+        let why = format!(
+            "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
+             origin, or write a .vtp file"
+        );
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+    }
     let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
     for (face, corners) in faces.iter().zip(polygons.iter()) {
         let corner = |i: usize| point(corners[i % corners.len()]);
@@ -176,13 +187,6 @@ fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<
         // A fan from a corner could have triangles without area.
         let middle = root.to_user(face.square.centre()).map(|c| c as f32);
         triangles.extend((0..corners.len()).map(|i| [middle, corner(i), corner(i + 1)]));
-    }
-    if let Some([at, ..]) = triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
-        let why = format!(
-            "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
-             origin, or write a .vtp file"
-        );
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     Ok(triangles)
 }

@@ -59,7 +59,7 @@ const PAGE: [f64; 2] = [1360.0, MAP_HEIGHT_MAX];
 const NO_LEAF: &str =
     "no leaf of the selection is in a slice: give another --slice or a larger --clip";
 
-/// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, normal to z through the root's
+/// The plane normal to the shortest extent of the body that halves the area of its facets, each at its centroid; without a body, normal to z through the root's
 /// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail. One beyond the clip box is
 /// replaced by that through the box's centre.
 fn middle(root: &Root, body: Option<&[Facet]>, clip: Option<[[i64; 3]; 2]>) -> Slice {
