@@ -175,7 +175,7 @@ impl Groups {
         let networks: HashMap<&str, Network> = lines.iter().filter_map(Line::network).collect();
         let (mut origins, mut meshes) = (<[Origins; 2]>::default(), Meshes::new());
         let (mut left_out, mut lacks, mut notes) = (Vec::new(), BTreeMap::new(), Vec::new());
-        let mut runs: Vec<(Run, Network)> = Vec::new();
+        let (mut runs, mut warm_ups) = (Vec::<(Run, Network)>::new(), Vec::<Run>::new());
         let mut named: Vec<(&str, &Setup, Setup)> = Vec::new();
         for line in lines {
             let session: Option<&Session> = sessions.get(&line.session).copied();
@@ -195,9 +195,15 @@ impl Groups {
                 Entry::Run(as_recorded) => {
                     let setup = apart(as_recorded, session, network, &mut origins);
                     named.push((&line.session, &as_recorded.setup, setup.clone()));
-                    let run = Run { setup, ..(**as_recorded).clone() };
+                    let mut run = Run { setup, ..(**as_recorded).clone() };
                     if run.warm_up {
+                        warm_ups.push(run);
                         continue;
+                    }
+                    // A program may have a digest only of a mesh that it writes, as in warm-ups.
+                    if run.digest.is_empty() {
+                        let same = warm_ups.iter().rfind(|warm| warm.setup == run.setup);
+                        run.digest = same.map_or(String::new(), |warm| warm.digest.clone());
                     }
                     match another_mesh(&run, &lacks, &mut meshes) {
                         None => runs.push((run, network.copied().unwrap_or(ASSUMED))),

@@ -1,7 +1,7 @@
 //! Groups of runs in the form that figures and tables need: by case, as points, with provenance and labels.
 
 use crate::figure::{Kind, Point, Provenance, Series};
-use bench::experiments::entry::{Comm, Setup};
+use bench::experiments::entry::{Comm, Run, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
 use contract::number::grouped;
@@ -42,11 +42,12 @@ pub fn repetitions(groups: &[&Group], value: impl Fn(&Group) -> Median) -> Strin
 
 /// The clock of each program, as a sentence, if they are not the same.
 pub fn clocks<'a>(groups: impl Iterator<Item = &'a Group>) -> Option<String> {
-    let of_clock = by_key(groups.filter(|g| g.setup.comm != Comm::Sim), |g| {
-        let is_own = g.runs.iter().any(|run| run.time_wall_s != run.time_launch_s);
-        if is_own { "the program's own clock" } else { "the whole process, seen from outside" }
+    let runs = groups.filter(|g| g.setup.comm != Comm::Sim).flat_map(|group| &group.runs);
+    let of_clock = by_key(runs, |run| match run.time_wall_s == run.time_launch_s {
+        true => "the whole process, seen from outside",
+        false => "the program's own clock",
     });
-    let programs = |of: &[&Group]| distinct(of.iter().map(|g| &*g.setup.engine)).join(", ");
+    let programs = |of: &[&Run]| distinct(of.iter().map(|run| &*run.setup.engine)).join(", ");
     let clocks = of_clock.iter().map(|(clock, of)| format!("{}: {clock}", programs(of)));
     let clocks = clocks.collect::<Vec<_>>().join("; ");
     (of_clock.len() > 1).then(|| format!("Measured times are of different clocks: {clocks}."))

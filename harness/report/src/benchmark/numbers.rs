@@ -9,6 +9,7 @@
 //! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
 //! more significant digits that is written by hand and that no result rounds to. Texts that it includes are compared as well.
 
+use super::groups::clocks;
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
 use contract::number::{digits, grouped};
@@ -34,12 +35,13 @@ pub struct Number {
 
 /// All results of a record.
 pub fn numbers(groups: &Groups) -> Vec<Number> {
-    let mut all: Vec<Number> = groups.all.iter().flat_map(|group| of(groups, group)).collect();
-    name_apart(all.iter_mut().map(|number| &mut number.key));
-    all
+    let mut setups: Vec<String> = groups.all.iter().map(key_of).collect();
+    name_apart(setups.iter_mut());
+    groups.all.iter().zip(&setups).flat_map(|(group, setup)| of(groups, group, setup)).collect()
 }
 
-fn of(groups: &Groups, group: &Group) -> Vec<Number> {
+/// The part of a key that all numbers of a group have.
+fn key_of(group: &Group) -> String {
     let s = &group.setup;
     let experiment = match s.division().as_str() {
         "default" if s.experiment == "layers" => format!("layers n{}", s.layer_cells_min),
@@ -47,9 +49,13 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         division => format!("{} {division}", s.experiment),
     };
     let names = [&s.engine, &s.case, &experiment].map(|name| file_name(name)).join("/");
-    let setup = format!("{names}/{}/{}/{}", group.cells(), s.ranks, group.how());
+    format!("{names}/{}/{}/{}", group.cells(), s.ranks, group.how())
+}
+
+fn of(groups: &Groups, group: &Group, setup: &str) -> Vec<Number> {
     let base = groups.reference(group);
-    let scales = base.setup.ranks < s.ranks;
+    let scales =
+        base.setup.ranks < group.setup.ranks && clocks([base, group].into_iter()).is_none();
     let is_speedup = scales && base.cells() == group.cells();
     let quantities = [
         ("time", Some(group.time_s), "s"),
@@ -101,8 +107,8 @@ pub fn tex(numbers: &[Number]) -> String {
 /// the first commands begins an interval or a short title. Before a word, `in` is one as well.
 const NOT_READ: [&str; 5] = [
     r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
-    r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
-    r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
+    r"\\(?:[a-zA-Z]*(?:label|ref|cite)|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
+    r"\\[a-zA-Z]+\*?\[[^\]\n]*\]|[}\]]\[[^\]\n]*[a-zA-Z!][^\]\n]*\]",
     r"\\definecolor\s*(?:\{[^}]*\}\s*){3}",
     r"[0-9.]+(?:[ \t]*(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
@@ -262,7 +268,8 @@ mod tests {
         let all = numbers(&Groups::of(&[one, of(4), of(6)]));
         let keys: BTreeSet<&str> = all.iter().map(|number| number.key.as_str()).collect();
         assert_eq!(keys.len(), all.len());
-        assert!(keys.iter().any(|key| key.ends_with("/time-2")), "{keys:?}");
+        let of_second = keys.iter().filter(|key| key.contains("/projected-2/"));
+        assert_eq!(of_second.count(), 4, "all numbers of the second group: {keys:?}");
         let speedup = all.iter().find(|n| n.key.ends_with("/2/projected/speedup")).unwrap();
         assert!(speedup.value.starts_with("1.3"), "{speedup:?}");
         assert!(tex(&all).contains(&format!(
@@ -330,6 +337,8 @@ mod tests {
             ("9\\,011.3 s", "9\\,011.3 is written by hand"),
             ("8~234.5 s", "8~234.5 is written by hand"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
+            ("CI$_{95}[9.87, 1.23]$", "9.87 is written by hand"),
+            ("\\myresult{9.87}", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
             ("\\url{http://x/a%20b} 9.87", "9.87 is written by hand"),

@@ -1,8 +1,8 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase; and over the ranks of a run: useful time, load imbalance.
 
 use super::groups::{
-    Subject, by_subject, cells_label, cited, is_counterpart, point, provenance, range, rank_times,
-    repetitions,
+    Subject, by_subject, cells_label, cited, clocks, is_counterpart, point, provenance, range,
+    rank_times, repetitions,
 };
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
@@ -97,6 +97,7 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
         repetitions(all, |group| groups.speedup(group)),
         Groups::networks(all.iter().copied()),
     );
+    caption.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
     // The reason for one point is none for another.
     let above = all.iter().filter(|g| groups.speedup(g).value > g.setup.ranks as f64 + 1e-9);
     let reason = |group: &&Group| {

@@ -9,7 +9,7 @@
 //! An engine without a run report is described by the manifest of its mesh, which has cells and digest only.
 
 use serde::{Deserialize, Deserializer};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// A run report. Lists have one entry per rank.
@@ -109,7 +109,11 @@ impl RunReport {
         let mut times = vec![self.time_wall_s.as_slice()];
         let mut numbers = vec![("peak_rss_bytes", &self.peak_rss_bytes)];
         numbers.extend(self.counters.iter().map(|(name, of)| (name.as_str(), of)));
+        let mut names = BTreeSet::new();
         for phase in &self.phases {
+            if !names.insert(&phase.name) {
+                return Some(format!("the phase {} has two entries: add them up", phase.name));
+            }
             times.extend([&*phase.time_wall_s, &phase.time_cpu_s]);
             times.extend([&*phase.time_comm_wall_s, &phase.time_comm_cpu_s]);
             numbers.push(("messages", &phase.messages));
@@ -169,6 +173,7 @@ mod tests {
             (r#""time_wall_s": -1.0"#.to_owned(), "a time of -1e0 s"),
             (r#""time_wall_s": 1e300"#.to_owned(), "a time of 1e300 s"),
             (phase(r#""time_cpu_s": [1.0, -2.0]"#), "a time of -2e0 s"),
+            (r#""phases": [{"name": "a"}, {"name": "a"}]"#.to_owned(), "a has two entries"),
             (phase(r#""messages": [9223372036854775808, 9223372036854775808]"#), "sum of messages"),
             (r#""peak_rss_bytes": [18446744073709551615, 1]"#.to_owned(), "sum of peak_rss_bytes"),
             (r#""counters": {"rays": [18446744073709551615, 1]}"#.to_owned(), "sum of rays over"),
