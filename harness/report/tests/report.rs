@@ -248,6 +248,24 @@ fn times_of_different_clocks_are_named() {
     // The figures of time over cells, time over layers and the rate, and the tables of experiments with measured runs.
     let count = page.replace("&#39;", "'").matches(&clocks.replace("&#39;", "'")).count();
     assert_eq!(count, 6, "{page}");
+
+    // Of one program, whose clock shows nothing on several ranks: its speedup says so, and is no number for a text.
+    let mut lines = record();
+    for line in &mut lines {
+        if let Entry::Run(run) = &mut line.entry
+            && (run.setup.comm, run.setup.ranks > 1) == (Comm::Mpi, true)
+        {
+            run.time_wall_s = run.time_launch_s;
+        }
+    }
+    let place = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
+    assert!(page.contains("own clock; mesher: the whole process"), "{page}");
+    let numbers = |at: &Path| std::fs::read_to_string(at.join("numbers.tex")).unwrap();
+    let speedups = |text: String| text.matches("/measured/speedup").count();
+    let all = tempfile::tempdir().unwrap();
+    report(all.path(), &record()).unwrap();
+    assert!(speedups(numbers(place.path())) < speedups(numbers(all.path())));
 }
 
 /// The model has steps just after powers of two.
