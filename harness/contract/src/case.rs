@@ -123,14 +123,13 @@ impl Case {
         };
         let level_surface = level("spacing_min", file.spacing_min)?;
         let mut boxes = Vec::new();
-        for (i, b) in file.boxes.iter().enumerate() {
-            positive("box spacing", b.spacing)?;
-            let ordered =
-                |a: usize| b.min[a] < b.max[a] && b.min[a].is_finite() && b.max[a].is_finite();
+        for (i, &BoxFile { min, max, spacing }) in file.boxes.iter().enumerate() {
+            positive("box spacing", spacing)?;
+            let ordered = |a: usize| min[a] < max[a] && min[a].is_finite() && max[a].is_finite();
             let why = format!("box {i}: min must be below max in every axis, and finite");
             Failure::unless((0..3).all(ordered), why)?;
-            let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
-            boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
+            let (min, max) = (root.quantise_clamped(min), root.quantise_clamped(max));
+            boxes.push(ExtentBox { min, max, level: level("box spacing", spacing)? });
         }
         let seed = |(i, &seed): (usize, &[f64; 3])| {
             let at = point(seed);
@@ -146,7 +145,7 @@ impl Case {
             boxes,
             seeds: file.seeds.iter().enumerate().map(seed).collect::<Result<_, String>>()?,
             enclosed: file.enclosed,
-            ..Manifest::without_leaves(Tree::Final, root, String::new())
+            ..Manifest::without_leaves(root, String::new())
         };
         let (facets_lattice, seeds) = (on_lattice(&root, &facets)?, file.seeds.clone());
         let mut table: Table = text.parse().expect("what was read is TOML");

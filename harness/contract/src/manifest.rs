@@ -248,12 +248,11 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The manifest of a mesh without rules and leaves: everything is kept, and no level is required.
-    pub fn without_leaves(tree: Tree, root: Root, program: String) -> Self {
+    /// The manifest of a final mesh without rules and leaves: everything is kept, and no level is required.
+    pub fn without_leaves(root: Root, program: String) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
             program,
-            tree,
             root,
             layer_cells_min: 1,
             keep: Keep::All,
@@ -264,7 +263,7 @@ impl Manifest {
     }
 
     /// The names of its files.
-    pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
+    pub fn names(&self) -> impl Iterator<Item = &String> {
         self.parts.iter().map(|part| &part.file).chain(&self.hyper_tree_grid)
     }
 

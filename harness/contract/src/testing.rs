@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::import::cells::Cells;
 use crate::lattice::{FacetLattice, Root};
 use crate::leafset::LeafSet;
-use crate::manifest::{Manifest, Tree};
+use crate::manifest::Manifest;
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::triangle::Triangle;
 use crate::word::{self, Side};
@@ -107,7 +107,7 @@ pub fn assert_text(text: &str, expected: &str) {
 /// A mesh of these parts with a correct manifest. Its inputs delete nothing and require no refinement.
 pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
     let root = Root { origin: [0.0; 3], edge: 8.0 };
-    let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
+    let empty = Manifest::without_leaves(root, "test".to_owned());
     LeafSet::new(empty, Vec::new()).with_parts(parts)
 }
 

@@ -5,7 +5,7 @@ use crate::selection::Selection;
 use contract::failure::Result;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tree};
+use contract::manifest::Manifest;
 use contract::mesh::Mesh;
 use std::path::Path;
 use tempfile::TempDir;
@@ -32,7 +32,7 @@ pub fn whole(mesh: &Mesh) -> Export<'_> {
 
 /// A mesh of these parts in a directory, which lasts as long as the first value.
 pub fn stored(parts: Vec<Vec<u64>>, root: Root) -> (TempDir, Mesh) {
-    let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
+    let empty = Manifest::without_leaves(root, "test".to_owned());
     let dir = tempfile::tempdir().unwrap();
     LeafSet::new(empty, Vec::new()).with_parts(parts).write(dir.path()).unwrap();
     let mesh = Mesh::open(dir.path()).unwrap();

@@ -6,7 +6,7 @@ use contract::failure::{EXIT_INPUT, Failure};
 use contract::htg::{TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tree};
+use contract::manifest::Manifest;
 use contract::mesh::Leaf;
 use contract::mesh::Mesh;
 use contract::testing::random_words;
@@ -24,7 +24,7 @@ const ROOT: Root = Root { origin: [0.1, -1.0, 1e6], edge: 0.3 };
 
 /// A mesh of these parts on disk.
 fn on_disk(parts: Vec<Vec<u64>>) -> (TempDir, Mesh) {
-    let empty = Manifest::without_leaves(Tree::Final, ROOT, "test".to_owned());
+    let empty = Manifest::without_leaves(ROOT, "test".to_owned());
     let set = LeafSet::new(empty, Vec::new()).with_parts(parts);
     let dir = tempfile::tempdir().unwrap();
     set.write(dir.path()).unwrap();

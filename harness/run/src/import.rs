@@ -87,8 +87,7 @@ pub fn import(
         }
     }
     let request = Request { root, is_root_of_case: request.root.is_none(), ..request.clone() };
-    let cells = read(path, format, &request, &Paths::find(), limit);
-    let cells = cells.map_err(|failure| failure.of_file(path))?;
+    let cells = read(path, format, &request, &Paths::find(), limit).map_err(input)?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
 }

@@ -63,9 +63,8 @@ struct State {
 impl State {
     fn new(manifest: &Manifest, nodes_max: usize) -> Self {
         // Of a mesh without parts, the tree is the only one.
-        let files = manifest.parts.iter().map(|part| &part.file).chain(&manifest.hyper_tree_grid);
         let part = |file: &String| Part { file: file.clone(), ..Part::default() };
-        let parts: Vec<Part> = files.map(part).collect();
+        let parts: Vec<Part> = manifest.names().map(part).collect();
         let last_of_part = vec![None; parts.len()];
         let mut tally = Manifest { root: manifest.root, parts, ..Manifest::default() };
         tally.clear_leaves();

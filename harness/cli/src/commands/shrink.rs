@@ -52,10 +52,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8> {
     let EngineArguments { engine, programs: given } = &arguments.engine;
     let programs = arguments.engine.find()?;
-    programs.engine.require()?;
-    if programs.engine.description.promises.definition {
-        programs.reference.require()?;
-    }
+    programs.require()?;
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),

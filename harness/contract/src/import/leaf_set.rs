@@ -48,9 +48,7 @@ pub fn leaf_set(
 fn manifest_of(root: Root, case: Option<&Case>, program: String) -> Manifest {
     match case {
         Some(case) => Manifest { root, ..case.manifest(Tree::Final, program) },
-        None => {
-            Manifest { lacks_inputs: true, ..Manifest::without_leaves(Tree::Final, root, program) }
-        }
+        None => Manifest { lacks_inputs: true, ..Manifest::without_leaves(root, program) },
     }
 }
 

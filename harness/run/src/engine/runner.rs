@@ -232,8 +232,7 @@ impl Engine {
             Some(mesh) if !is_written => {
                 RunReport { cells: mesh.manifest.leaves, ..RunReport::default() }
             }
-            _ => RunReport::read(&options.report_path())
-                .map_err(|why| format!("ended, but {why}"))?,
+            _ => RunReport::read(&options.report_path()).map_err(|e| format!("ended, but {e}"))?,
         };
         if let Some(mesh) = written {
             // Limits apply to this number, so it must be one of leaves that exist.
@@ -386,6 +385,17 @@ impl Programs {
         };
         let reference = Engine::find("reference", given.reference.as_deref(), &paths)?;
         Ok(Self { paths, engine, others: Vec::new(), mesher, reference })
+    }
+
+    /// Refuses to go on without the program of the engine, or without the reference if the engine promises the definition: no other mesh is
+    /// compared with it.
+    ///
+    /// # Errors
+    /// If one of them is missing.
+    pub fn require(&self) -> Result<(), Refusal> {
+        self.engine.require()?;
+        let promises = &self.engine.description.promises;
+        if promises.definition { self.reference.require() } else { Ok(()) }
     }
 
     /// The engine of this name, or that is called so in results: the mesher, the reference or an engine under test.

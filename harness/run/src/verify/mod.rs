@@ -32,11 +32,7 @@ use tempfile::TempDir;
 /// If the verification could not begin. Failures after that are in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report> {
     let start = Instant::now();
-    programs.engine.require()?;
-    if programs.engine.description.promises.definition {
-        // Only the definition is compared with it.
-        programs.reference.require()?;
-    }
+    programs.require()?;
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     let why = format!("no case in {} has this size", programs.paths.catalogue.path.display());
     Failure::unless(!selected.is_empty(), why)?;
