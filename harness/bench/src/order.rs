@@ -40,8 +40,7 @@ impl Origins {
     /// Returns the suffix of a name for measurements of this origin. An unknown origin is empty, and one of its own.
     pub fn suffix(&mut self, name: &str, origin: &str) -> String {
         let seen = self.0.entry(name.to_owned()).or_default();
-        let known = seen.iter().position(|other| other == origin);
-        let at = known.unwrap_or_else(|| {
+        let at = seen.iter().position(|other| other == origin).unwrap_or_else(|| {
             seen.push(origin.to_owned());
             seen.len() - 1
         });

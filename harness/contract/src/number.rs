@@ -22,8 +22,7 @@ pub fn grouped(n: u64) -> String {
 /// This name, or else the first that is free with a number after it, from 2 on.
 pub fn numbered(name: &str, separator: char, is_free: impl FnMut(&String) -> bool) -> String {
     let numbered = (2..).map(|number| format!("{name}{separator}{number}"));
-    let mut names = iter::once(name.to_owned()).chain(numbered);
-    names.find(is_free).expect("numbers do not end")
+    iter::once(name.to_owned()).chain(numbered).find(is_free).expect("numbers do not end")
 }
 
 /// A duration in seconds up to two minutes, and in minutes beyond, rounded up.

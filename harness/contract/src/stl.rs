@@ -86,8 +86,7 @@ type Word<'a> = (&'a [u8], usize);
 /// The words of a text. A carriage return before a line feed ends one more line, which does no harm: lines are only compared.
 fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let lines = text.split(|b| matches!(b, b'\n' | b'\r')).enumerate();
-    lines.flat_map(|(line, text)| {
+    text.split(|b| matches!(b, b'\n' | b'\r')).enumerate().flat_map(|(line, text)| {
         let words = text.split(|b| matches!(b, b' ' | b'\t' | 0x0b | 0x0c));
         words.filter(|word| !word.is_empty()).map(move |word| (word, line))
     })

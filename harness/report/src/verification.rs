@@ -86,11 +86,10 @@ fn remarks(report: &Report) -> Vec<String> {
         let name = &case.name;
         lines.extend(case.input_error.iter().map(|error| format!("input: {name}: {error}")));
         lines.extend(outcomes(case, report));
-        let notes = case.checks.iter().flat_map(|c| c.notes.iter().map(move |note| (c, note)));
-        let line = |(c, note): (&Check, &String)| {
-            format!("note: {name}: {}: {}: {note}", c.subject, c.name)
-        };
-        lines.extend(notes.map(line));
+        for check in &case.checks {
+            let of = format!("note: {name}: {}: {}", check.subject, check.name);
+            lines.extend(check.notes.iter().map(|note| format!("{of}: {note}")));
+        }
         lines.extend(case.kept.iter().map(|place| format!("kept: {name}: {place}")));
         lines.extend(case.repeat_with.iter().map(|command| format!("repeat with: {command}")));
     }

@@ -97,13 +97,11 @@ pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
 
 /// Returns the time of a run in seconds: measured, or projected for simulated ranks.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
-    match run.setup.comm {
-        Comm::Sim => {
-            let phases = run.phases.iter().map(|phase| phase_s(run, phase, network));
-            phases.reduce(|a, b| a + b).unwrap_or(run.useful_s.max)
-        }
-        Comm::Mpi | Comm::Solo => run.time_wall_s,
+    if run.setup.comm != Comm::Sim {
+        return run.time_wall_s;
     }
+    let phases = run.phases.iter().map(|phase| phase_s(run, phase, network));
+    phases.reduce(|a, b| a + b).unwrap_or(run.useful_s.max)
 }
 
 /// Why factors are left out, as the end of a sentence.

@@ -41,8 +41,7 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         return;
     }
     for case in bench.cases_of(name) {
-        let baseline = bench.baseline.as_ref();
-        let old = baseline.map(|subject| bench.measured(subject, case, name));
+        let old = bench.baseline.as_ref().map(|subject| bench.measured(subject, case, name));
         let new = bench.measured(&bench.candidate, case, name);
         if new.as_ref().is_err_and(Failure::is_interrupt) {
             break;

@@ -199,8 +199,7 @@ impl Tolerance {
     pub fn of_metric(&self, metric: &str, layer: LayerName) -> f64 {
         // "4 ranks/messages" is also known as "messages".
         let plain = metric.rsplit('/').next().unwrap_or(metric);
-        let own = self.of.get(metric).or_else(|| self.of.get(plain));
-        own.copied().unwrap_or(match layer {
+        self.of.get(metric).or_else(|| self.of.get(plain)).copied().unwrap_or(match layer {
             LayerName::Memory => self.memory,
             LayerName::Instructions => self.instructions,
             _ => self.counters,

@@ -100,8 +100,7 @@ impl Subject {
 
 /// Builds and returns the program of a revision, or that of the repository's working tree.
 fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf> {
-    let cache = repository.join("target/gate");
-    let place = cache.join(revision.unwrap_or("working-tree"));
+    let place = repository.join("target/gate").join(revision.unwrap_or("working-tree"));
     let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));
     let mut values = Values::default();
     for (name, path) in [("target", place.join("build")), ("root", tree)] {
@@ -125,8 +124,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let (builder, arguments) = words.split_first().ok_or(why)?;
     let mut command = Command::new(builder);
     command.args(arguments).current_dir(tree);
-    let built = process::run(&mut command, &Watch::new("build", LIMIT, &place));
-    built.map_err(|failure| {
+    process::run(&mut command, &Watch::new("build", LIMIT, &place)).map_err(|failure| {
         let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
         Failure { why, ..failure.into() }
     })?;

@@ -93,8 +93,7 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
     let path = bench.prepare(baseline, case, "time").map_err(|why| failed(0, why))?;
     let run = |index: usize| {
         let engine = if index == CANDIDATE { &bench.candidate.engine } else { baseline };
-        let place = emptied(bench.place.join("time/run"), engine);
-        let place = place.map_err(|why| failed(index, why))?;
+        let place = emptied(bench.place.join("time/run"), engine).map_err(|e| failed(index, e))?;
         let options = RunOptions::new(&place, bench.options.timeout);
         engine.run(&path, &Layout::on(ranks), &options).map_err(|why| failed(index, why))
     };

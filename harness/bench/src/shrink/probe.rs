@@ -137,8 +137,7 @@ impl Probe {
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
         if promises.deterministic && ranks == Ranks::Serial {
-            let again = self.run(&self.engine, path, ranks);
-            let again = again.map_err(Failure::input)?;
+            let again = self.run(&self.engine, path, ranks).map_err(Failure::input)?;
             let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
             let compared = identical::compare(&again.words, words, &subject.terms.root);
             results.push(CheckResult { name: "deterministic", ..compared });

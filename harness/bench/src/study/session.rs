@@ -219,8 +219,7 @@ impl Session<'_> {
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
         let SessionOptions { no_mpi, launcher, .. } = self.options;
-        let is_missing = !launcher.is_found();
-        if *no_mpi { Some(NO_MPI) } else { is_missing.then_some(NO_LAUNCHER) }
+        if *no_mpi { Some(NO_MPI) } else { (!launcher.is_found()).then_some(NO_LAUNCHER) }
     }
 
     /// Plans the runs of a series at one size.
@@ -305,8 +304,7 @@ impl Session<'_> {
             return Ok(known.clone());
         }
         (self.progress)(&format!("{case}: reading the geometry"));
-        let paths = &self.runner.programs.paths;
-        let path = paths.catalogue.case_file(case, &self.study.directory)?;
+        let path = self.runner.programs.paths.catalogue.case_file(case, &self.study.directory)?;
         let base = Base::read(&path, per_rank, self.runner.place)?;
         self.bases.insert(key, base.clone());
         Ok(base)

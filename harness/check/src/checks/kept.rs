@@ -32,9 +32,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         let is_sought = inputs.deletes_enclosed() && manifest.tree == Kind::Final;
         let is_compared = manifest.components.is_some() || is_sought && result.note.is_empty();
         let none = !is_compared && inputs.seeds.is_empty();
-        let why = || "neither seeds nor counts of components are stated".to_owned();
-        return result
-            .requires(some_leaves(subject.tree_with_deleted()).or_else(|| none.then(why)));
+        let why = none.then(|| "neither seeds nor counts of components are stated".to_owned());
+        return result.requires(some_leaves(subject.tree_with_deleted()).or(why));
     };
     result.examined = subject.examined_with(truth);
     let terms = &subject.terms;

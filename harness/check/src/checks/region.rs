@@ -173,7 +173,6 @@ impl<'a> Survey<'a> {
             return Some(self.position(octant));
         }
         let children = if octant.level < self.terms.level_surface { 0..8 } else { 0..0 };
-        let mut parts = children.map(|digit| octant.child(digit));
-        parts.find_map(|part| self.beyond_band(part, &near))
+        children.map(|digit| octant.child(digit)).find_map(|part| self.beyond_band(part, &near))
     }
 }

@@ -41,9 +41,7 @@ impl Isometry {
             let reversed = |bits: usize| [0, 1, 2].map(|axis| bits >> axis & 1 == 1);
             (0..8).map(move |bits| Self { to, is_reversed: reversed(bits), shift: [0; 3] })
         });
-        let mut glued =
-            all.map(|map| Self { shift: map.of_cube(beyond, LENGTH).map(|c| -c), ..map });
-        glued.find(|map| {
+        all.map(|map| Self { shift: map.of_cube(beyond, LENGTH).map(|c| -c), ..map }).find(|map| {
             map.is_possible(dimension)
                 && map.to[face / 2] == its / 2
                 && map.of_cube(from, 0) == onto

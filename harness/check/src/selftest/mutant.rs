@@ -169,8 +169,7 @@ pub(super) fn sibling_groups(words: &[u64]) -> Vec<usize> {
 
 /// The parent of a leaf, with the leaf's side.
 pub(super) fn parent(word: u64) -> u64 {
-    let octant = word::octant(word);
-    word::encode(octant.parent(), word::side(word))
+    word::encode(word::octant(word).parent(), word::side(word))
 }
 
 /// The words with the groups of eight siblings at these ascending indices merged.

@@ -71,8 +71,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("side flipped against the seeds", "sides", INFORMED, |s| {
         let flow = s.case.side_of_flow();
-        let flipped = swapped(s, |w| word::side(w) == flow);
-        flipped.filter(|_| !s.case.seeds.is_empty())
+        swapped(s, |w| word::side(w) == flow).filter(|_| !s.case.seeds.is_empty())
     }),
     edit("manifest: one outside component too many", "kept", INFORMED, |m| {
         m.components.iter_mut().for_each(|c| c.outside += 1);

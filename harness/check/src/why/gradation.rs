@@ -107,8 +107,7 @@ impl Mesh<'_> {
         let search = Search { mesh: self, octant, first, last };
         let is_wide = |&level: &u8| edge_of(level) >= self.layer_reach(first);
         let centre = octant.ancestor((1..=octant.level).rev().find(is_wide).unwrap_or(0));
-        let mut starts = OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset));
-        starts.find_map(|start| {
+        OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset)).find_map(|start| {
             // A leaf of the octant's level or a coarser one contains no leaf that is sought.
             let found = Some(self.tree.at(&start)).filter(|handle| handle.is_node());
             search.enter(start, found.unwrap_or(Handle::HOLE), false)
@@ -187,15 +186,13 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Searches an octant with this content. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
-    fn enter(&self, at: Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
-        let is_hole = !content.is_node() && content.as_leaf().is_none();
+    fn enter(&self, at: Octant, handle: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
+        let is_hole = !handle.is_node() && handle.as_leaf().is_none();
         match () {
             () if at == *self.octant || self.is_far(&at) => None,
             () if is_hole && !self.mesh.has_deleted_crossing() => None,
-            () if is_hole => self.hole(at, content, in_deleted),
-            () if content.is_node() && self.counts_as_split(&at) => {
-                self.descend(&at, content, false)
-            }
+            () if is_hole => self.hole(at, handle, in_deleted),
+            () if handle.is_node() && self.counts_as_split(&at) => self.descend(&at, handle, false),
             () => self.leaf(at),
         }
     }

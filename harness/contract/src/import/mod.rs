@@ -156,8 +156,7 @@ pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
 /// # Errors
 /// If there is none.
 pub fn side(code: f64, cell: usize) -> Result<Side> {
-    let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
-    known.ok_or_else(|| {
+    Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code).ok_or_else(|| {
         Failure::input(format!(
             "cell {cell} has the side {code}, and the sides are 0 (outside), 1 (inside) and 2 (crossing)"
         ))

@@ -60,8 +60,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     fs::create_dir(&dir).map_err(named)?;
     // Every point is a vertex of a face.
     let is_wide = i32::try_from(of_mesh.faces.vertices.corners.len()).is_err();
-    let written = of_mesh.write(&export.mesh.manifest, is_wide, &dir);
-    written.map_err(|failure| failure.of_file(path))?;
+    of_mesh.write(&export.mesh.manifest, is_wide, &dir).map_err(|failure| failure.of_file(path))?;
     let mut bytes = 0;
     for file in fs::read_dir(&dir).map_err(named)? {
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();

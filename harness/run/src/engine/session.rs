@@ -157,10 +157,9 @@ fn members(leader: Pid) -> Vec<Pid> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let ids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
-    let of_session = ids
-        .filter(|&id| session(id) == leader)
-        .filter(|id| is_alive(&fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default()));
-    of_session.filter_map(Pid::from_raw).collect()
+    let of_session = ids.filter(|&id| session(id) == leader);
+    let stat = |id: &i32| fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+    of_session.filter(|id| is_alive(&stat(id))).filter_map(Pid::from_raw).collect()
 }
 
 fn adopted(kept: &[Pid]) -> Vec<Pid> {

@@ -96,10 +96,8 @@ impl Templates {
         let is_compared = promises.is_independent_of(Independence::Ranks);
         let why =
             "`independent_of` names partitioner, but not ranks, which vary with it: add \"ranks\"";
-        Failure::unless(
-            is_compared || !promises.independent_of.contains(&Independence::Partitioner),
-            why,
-        )
+        let on_partitioner = promises.independent_of.contains(&Independence::Partitioner);
+        Failure::unless(is_compared || !on_partitioner, why)
     }
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
@@ -123,8 +121,7 @@ impl Templates {
             Failure::unless(!needs_out || has("{out}"), why)?;
         }
         check_known("serve", &self.serve, &[])?;
-        let mut appended = self.appended().into_iter();
-        appended.try_for_each(|(key, of)| check_known(key, of, &["case", key]))
+        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of, &["case", key]))
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
@@ -203,9 +200,7 @@ fn placeholders(word: &str) -> impl Iterator<Item = &str> {
 /// A word with its placeholders replaced by their values; those without a value are left as they are.
 pub fn fill(word: &str, values: &Values) -> String {
     let known = placeholders(word).filter_map(|name| Some((name, values.get(name)?)));
-    let replaced =
-        |word: String, (name, value): (_, &String)| word.replace(&format!("{{{name}}}"), value);
-    known.fold(word.to_owned(), replaced)
+    known.fold(word.to_owned(), |word, (name, value)| word.replace(&format!("{{{name}}}"), value))
 }
 
 #[cfg(test)]

@@ -201,10 +201,8 @@ impl Needs {
 
     /// Whether an oracle is missing, or has hung, which costs the whole time limit.
     pub fn lacks_oracle(&self, oracle: &str) -> bool {
-        self.silent.borrow().iter().any(|failure| {
-            failure.program == oracle
-                && matches!(failure.end, End::Missing(_) | End::TimedOut { .. })
-        })
+        let is_silent = |end: &End| matches!(end, End::Missing(_) | End::TimedOut { .. });
+        self.silent.borrow().iter().any(|of| of.program == oracle && is_silent(&of.end))
     }
 
     /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.
