@@ -110,10 +110,9 @@ impl TreeFile {
                 leaves += count - u64::from((split | masked).count_ones());
                 level.next += count;
             }
-            let children = nodes.get(index + 1).copied().unwrap_or(0);
-            if 8 * parents != children {
-                let why =
-                    format!("level {index} splits {parents} nodes, and the next has {children}");
+            let next = nodes.get(index + 1).copied().unwrap_or(0);
+            if 8 * parents != next {
+                let why = format!("level {index} splits {parents} nodes, and the next has {next}");
                 return Err(TreeError::Damaged(why));
             }
         }
@@ -243,8 +242,7 @@ impl Walk<'_> {
         at.next += u64::from(count);
         // A block lies in one octant of level 3.
         let may_be_block = level > OCTANT_LEVEL;
-        let word =
-            |key: u64, level: usize, side: u8| key << 7 | (level as u64) << 2 | u64::from(side);
+        let word = |key: u64, level: usize, side| key << 7 | (level as u64) << 2 | u64::from(side);
         if may_be_block
             && split == 0xff
             && let Some(side) = self.levels[level + 1].side_of_64()?

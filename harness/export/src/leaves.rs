@@ -246,11 +246,10 @@ impl Square {
 
     /// The corners, counterclockwise around the positive axis or the negative one, the minimum corner first.
     pub fn corners(&self, is_positive: bool) -> [Point; 4] {
-        let mut corners =
-            [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| self.moved(self.level, i, j));
+        let mut all = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| self.moved(self.level, i, j));
         if !is_positive {
-            corners[1..].reverse();
+            all[1..].reverse();
         }
-        corners
+        all
     }
 }

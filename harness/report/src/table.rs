@@ -62,8 +62,7 @@ impl Table {
     pub fn markdown(&self) -> String {
         let line = |fields: Vec<String>| format!("| {} |\n", fields.join(" | "));
         let rule = |i: usize| if self.is_number(i) { "---:" } else { "---" }.to_owned();
-        let mut text =
-            line(self.columns.iter().map(|title| escaped(&title.replace('\n', " "))).collect());
+        let mut text = line(self.columns.iter().map(|c| escaped(&c.replace('\n', " "))).collect());
         text += &line((0..self.columns.len()).map(rule).collect());
         let rows = self.rows.iter().map(|row| line(row.iter().map(|of| escaped(of)).collect()));
         text + &rows.collect::<String>()

@@ -95,9 +95,7 @@ fn sign(series: &Series, change: &Change) -> Option<&'static str> {
 
 /// All steps with their series.
 fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
-    all.iter()
-        .flat_map(|series| series.changes.iter().map(move |change| (series, change)))
-        .collect()
+    all.iter().flat_map(|s| s.changes.iter().map(move |change| (s, change))).collect()
 }
 
 /// A step per line.

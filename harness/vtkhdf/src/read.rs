@@ -143,12 +143,11 @@ impl Source {
 
     /// The numbers of a small array, as bits: after its type and what else describes it.
     fn numbers(&self, address: u64) -> Result<Vec<u64>> {
-        let header = self.header(address)?;
-        let count =
-            header.get(8..16).map(number).and_then(|n| usize::try_from(n).ok()?.checked_mul(8));
-        let begin = count.and_then(|bytes| header.len().checked_sub(bytes));
+        let head = self.header(address)?;
+        let len = head.get(8..16).map(number).and_then(|n| usize::try_from(n).ok()?.checked_mul(8));
+        let begin = len.and_then(|bytes| head.len().checked_sub(bytes));
         let begin = begin.ok_or_else(|| unknown("an array is shorter than it states"))?;
-        Ok(header[begin..].chunks_exact(8).map(number).collect())
+        Ok(head[begin..].chunks_exact(8).map(number).collect())
     }
 
     /// Sets the places of an array's chunks.

@@ -2,7 +2,7 @@
 //! it would not finish.
 
 use super::entry::{CLOCKS_S, Comm, Line, Phase, Run, Setup, Spread};
-use super::machine;
+use super::machine::{cores, digest_of, digest_of_scripts};
 use crate::shown;
 use check::audit::audit_against;
 use contract::case::Case;
@@ -73,12 +73,11 @@ impl Runner<'_> {
         let counters = report.counters.iter().filter(|(_, of)| of.len() == setup.ranks);
         let counters = counters.map(|(name, of)| (name.clone(), spread(of)));
         let run = Run {
-            program: machine::digest_of(engine.files()),
-            scripts: machine::digest_of_scripts(&engine),
+            program: digest_of(engine.files()),
+            scripts: digest_of_scripts(&engine),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
-            oversubscribed: setup.comm == Comm::Mpi
-                && setup.ranks > machine::cores() * node_count(),
+            oversubscribed: setup.comm == Comm::Mpi && setup.ranks > cores() * node_count(),
             command: shown([command.get_program()].into_iter().chain(command.get_args())),
             facets: report.facets.unwrap_or(0),
             geometry: report.geometry.map(|geometry| geometry.digest),
@@ -99,7 +98,7 @@ impl Runner<'_> {
         // As of milliseconds for seconds. Ranks within one process run in turn, and the wall time that they report is that of one. Each may have threads, and a limit of cores be a fraction.
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };
         let wall_s = if setup.comm == Comm::Sim { run.time_launch_s } else { run.time_wall_s };
-        let most_s = (1 + machine::cores()) as f64 * (wall_s + CLOCKS_S);
+        let most_s = (1 + cores()) as f64 * (wall_s + CLOCKS_S);
         let why = format!("phases have {busy_s} s of CPU time, more than all cores in {wall_s} s");
         Failure::unless(busy_s <= most_s * node_count() as f64, why)?;
         Ok(run)
@@ -325,7 +324,7 @@ mod tests {
             let file = place.path().join("scripted.toml");
             std::fs::write(&file, words).unwrap();
             let engine = Engine::find(file.to_str().unwrap(), None, &Paths::find()).unwrap();
-            machine::digest_of(engine.files())
+            digest_of(engine.files())
         };
         assert!(program("a") == program("a") && program("a") != program("b"));
     }

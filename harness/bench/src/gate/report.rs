@@ -237,11 +237,10 @@ impl GateReport {
                 return Some(format!("{name} of {case}: nothing was compared: {why}"));
             }
         }
-        let is_missing = |f: &&GateFinding| {
+        let is_unmet = |f: &&GateFinding| {
             f.verdict == Verdict::Missing || self.require_layers && f.verdict == Verdict::LeftOut
         };
-        if let Some(GateFinding { case, metric, note, .. }) = layer.findings.iter().find(is_missing)
-        {
+        if let Some(GateFinding { case, metric, note, .. }) = layer.findings.iter().find(is_unmet) {
             return Some(format!("{name} of {case}: {metric}: {note}"));
         }
         layer.cases.is_empty().then(|| format!("the rules have no case for {name}"))

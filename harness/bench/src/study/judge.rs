@@ -64,8 +64,7 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let given = |(session, of): (_, Network)| (session, of.is_given().then(|| of.to_string()));
     let networks: Vec<_> = lines.iter().filter_map(Line::network).map(given).collect();
     if let Some((_, last)) = networks.iter().rfind(|(session, _)| sessions.contains(session)) {
-        sessions
-            .retain(|session| networks.iter().all(|(of, given)| of != session || given == last));
+        sessions.retain(|name| networks.iter().all(|(of, given)| of != name || given == last));
     }
     let of_sessions = || lines.iter().filter(|line| sessions.contains(&line.session.as_str()));
     fn made(run: &Run) -> [([&String; 2], &String); 2] {

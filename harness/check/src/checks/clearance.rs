@@ -84,8 +84,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
             let is_solid = self.tree.kinds(content) & HOLES == 0;
             if found.is_none() && is_solid {
                 found = self.directions.iter().find_map(|axes| {
-                    let region =
-                        Region::around(&part, Region::WHOLE, axes.map(|axis| axis * margin));
+                    let region = Region::around(&part, Region::WHOLE, axes.map(|a| a * margin));
                     Some((part, coarse.first_in(wide, &region)?))
                 });
             }
@@ -131,8 +130,7 @@ impl<'a> Boxes<'a> {
         let mut found: Option<[[u8; 3]; 2]> = None;
         for digit in 0..8 {
             let Some(part) = self.of(child(self.tree, at, digit)) else { continue };
-            let [low, high] =
-                part.map(|end| [0, 1, 2].map(|a| end[a] / 2 + 128 * (digit >> a & 1)));
+            let [low, high] = part.map(|c| [0, 1, 2].map(|a| c[a] / 2 + 128 * (digit >> a & 1)));
             let [from, to] = found.unwrap_or([low, high]);
             let ends = |a: usize| [from[a].min(low[a]), to[a].max(high[a])];
             found = Some([0, 1].map(|end| [0, 1, 2].map(|a| ends(a)[end])));
@@ -177,8 +175,7 @@ pub fn check_gap(
     result: &mut CheckResult,
 ) {
     let report = |[split, part, coarse]: [Octant; 3], result: &mut CheckResult| {
-        let (level, [part, coarse]) =
-            (split.level, [part, coarse].map(|octant| root.place(octant)));
+        let (level, [part, coarse]) = (split.level, [part, coarse].map(|at| root.place(at)));
         result.report(format_args!(
             "{what}: {part} is refined beyond level {level}, but too near to the leaf {coarse}"
         ));

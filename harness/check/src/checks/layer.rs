@@ -85,7 +85,7 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
         let margin = surface_margin(terms, kind, of_level);
         (margin > 0).then_some(Required { margin, by_itself })
     };
-    let report = |[leaf, _, coarse]: [Octant; 3], result: &mut CheckResult| {
+    let report = &|[leaf, _, coarse]: [Octant; 3], result: &mut CheckResult| {
         let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
         let cells = surface_margin(terms, kind, leaf.level) / edge_of(leaf.level);
         let (what, [leaf, coarse]) =
@@ -94,8 +94,7 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
             "a leaf less than {cells} cells from the {what} leaf {leaf} is coarser than the surface level: {coarse}"
         ));
     };
-    Clearance { tree, requires, bound: surface, directions: &ALL_AXES, report: &report }
-        .check(result);
+    Clearance { tree, requires, bound: surface, directions: &ALL_AXES, report }.check(result);
 }
 
 #[cfg(test)]

@@ -70,8 +70,7 @@ pub const CHECKS: [Check; 13] = [
 
 /// Runs all checks that the subject must pass.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
-    let is_of_files =
-        |check: &Check| [manifest::CHECK.name, pass::CHECK.name].contains(&check.name);
+    let is_of_files = |c: &Check| [manifest::CHECK.name, pass::CHECK.name].contains(&c.name);
     let wanted = CHECKS.iter().filter(|check| (check.wanted)(subject));
     // Counts and digests need no tree.
     let capacity = subject.capacity();

@@ -66,9 +66,8 @@ fn of_neighbours(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let [outside, inside] = [Side::Outside, Side::Inside].map(|side| 1 << side as u8);
     contact::visit(tree, outside, inside, &mut |outside, _, across| {
         if across & inside != 0 {
-            let leaf = terms.root.place(outside);
-            result
-                .report(format_args!("an inside leaf shares a face with the outside leaf {leaf}"));
+            let at = terms.root.place(outside);
+            result.report(format_args!("an inside leaf shares a face with the outside leaf {at}"));
         }
     });
 }

@@ -134,9 +134,8 @@ impl<'a> Crossed<'a> {
         let level = self.terms.level_surface;
         self.facets.leaves(tree, &mut |octant, _, near| {
             let is_coarse = octant.level < level;
-            let crossing =
-                if is_coarse { self.reaching(&octant, near) } else { near.first().copied() };
-            let Some(facet) = crossing else { return };
+            let hit = if is_coarse { self.reaching(&octant, near) } else { near.first().copied() };
+            let Some(facet) = hit else { return };
             result.examined += 1;
             if is_coarse {
                 let leaf = self.terms.root.place(octant);

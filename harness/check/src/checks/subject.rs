@@ -43,15 +43,10 @@ impl<'a> Subject<'a> {
     }
 
     /// A mesh by the pass over its leaves.
-    pub(crate) fn of(
-        manifest: &'a Manifest,
-        tree: Kind,
-        pass: Pass,
-        case: Option<&'a Case>,
-    ) -> Self {
-        let inputs = case.map_or(manifest, |case| &case.rules);
-        let inputs = Manifest { tree, sides: manifest.sides, ..inputs.clone() };
-        let (terms, promises) = (inputs.of_leaves(), Promises::of_definition());
+    pub(crate) fn of(stated: &'a Manifest, tree: Kind, pass: Pass, case: Option<&'a Case>) -> Self {
+        let inputs = case.map_or(stated, |case| &case.rules);
+        let inputs = Manifest { tree, sides: stated.sides, ..inputs.clone() };
+        let (manifest, terms, promises) = (stated, inputs.of_leaves(), Promises::of_definition());
         let (mesh, reference, truth, with_deleted) = Default::default();
         Self { manifest, case, terms, inputs, promises, mesh, reference, pass, truth, with_deleted }
     }

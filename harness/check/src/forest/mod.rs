@@ -66,19 +66,17 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
         let (mut next, mut leaves) = (0, Vec::with_capacity(quadrants.len()));
         for (index, quadrant) in quadrants.iter().enumerate() {
-            let name = || named(tree, index, quadrant);
+            let it = || named(tree, index, quadrant);
             let Some(leaf) = leaf(dimension, length, quadrant) else {
-                let name = name();
-                valid
-                    .report(format_args!("{name} is no octant of a tree whose length is {length}"));
+                let it = it();
+                valid.report(format_args!("{it} is no octant of a tree whose length is {length}"));
                 continue;
             };
             if leaf.key < next {
-                linear
-                    .report(format_args!("{} begins before the end of the one before it", name()));
+                linear.report(format_args!("{} begins before the end of the one before it", it()));
             } else if leaf.key > next {
                 let why = "does not begin where the one before it ends, or the tree begins";
-                complete.report(format_args!("{} {why}", name()));
+                complete.report(format_args!("{} {why}", it()));
             }
             next = leaf.key + (1 << (dimension * leaf.size().trailing_zeros() as usize));
             leaves.push(leaf);
@@ -160,8 +158,7 @@ pub fn audit(forest: &Forest, touching: Touching, start: Instant) -> AuditReport
         }
         Some(topology) => {
             let is_asked = |direction: &usize| direction.count_ones() <= touching as u32 + 1;
-            let mut directions: Vec<usize> =
-                (1..1 << topology.dimension).filter(is_asked).collect();
+            let mut directions: Vec<_> = (1..1 << topology.dimension).filter(is_asked).collect();
             directions.sort_by_key(|direction| direction.count_ones());
             let topology = &topology;
             Balance { forest, topology, trees: &of_trees, directions }.check(&mut balance);
@@ -210,8 +207,7 @@ pub fn diff(a: &Forest, b: &Forest) -> [CheckResult; 2] {
         move |leaf: &Quadrant| (leaf.corner.map(|at| i64::from(at) * scale), leaf.level)
     });
     for tree in 0..a.leaves.len().max(b.leaves.len()) {
-        let [of_a, of_b] =
-            [a, b].map(|forest| forest.leaves.get(tree).map_or(&[][..], Vec::as_slice));
+        let [of_a, of_b] = [a, b].map(|of| of.leaves.get(tree).map_or(&[][..], Vec::as_slice));
         let pairs = of_a.iter().map(&in_a).zip(of_b.iter().map(&in_b));
         let same = pairs.take_while(|(a, b)| a == b).count();
         if same < of_a.len().max(of_b.len()) {

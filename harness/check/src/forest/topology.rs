@@ -199,11 +199,10 @@ impl Topology {
             two => {
                 let axis = (0..3).find(|&axis| side(axis).is_none()).expect("one of three axes");
                 let own = edge_between(number(two), number(two) + (1 << axis));
-                let along = corner[axis];
+                let low = corner[axis];
                 let place = |(other, edge): Place| {
                     let mut at = at_corner(edge_end(edge % EDGES, false));
-                    at[edge % EDGES / 4] =
-                        if edge >= EDGES { LENGTH - size - along } else { along };
+                    at[edge % EDGES / 4] = if edge >= EDGES { LENGTH - size - low } else { low };
                     (other, at)
                 };
                 self.edges.with((tree, own)).map(place).collect()

@@ -25,8 +25,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     words("leaf of twice the size among its siblings", "linear", AUDITED, |s| {
         let first = |w| word::octant(w).digit() == 0;
         let parent = |w| word::octant(mutant::parent(w));
-        let within =
-            |pair: &[u64]| first(pair[0]) && parent(pair[0]).contains(&word::octant(pair[1]));
+        let within = |two: &[u64]| first(two[0]) && parent(two[0]).contains(&word::octant(two[1]));
         let mut words = s.mesh.words.clone();
         let i = words.windows(2).position(within)?;
         words[i] = mutant::parent(words[i]);

@@ -108,9 +108,8 @@ impl<'a> Mesh<'a> {
     fn has_nothing_finer(&self, trail: &Trail) -> bool {
         let level = trail.around.octant.level;
         let is_coarse = |handle, at| {
-            let may_have_crossing =
-                self.has_deleted_crossing() && self.tree.kinds(handle) & HOLES != 0;
-            self.tree.finest_level(handle, at) <= level && !may_have_crossing
+            let may_cross = self.has_deleted_crossing() && self.tree.kinds(handle) & HOLES != 0;
+            self.tree.finest_level(handle, at) <= level && !may_cross
         };
         level >= self.level_deepest
             || trail.all_nearby(self.layer_reach(level + 1).max(1), is_coarse)

@@ -26,15 +26,14 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells> {
         true => read_parts(path)?,
         false => vec![(String::new(), PartFile::open(path)?.read_all()?)],
     };
-    let (with_sides, root) = (request.sides.is_some(), request.root.unwrap_or(Root::UNIT));
-    let mut cells =
-        Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
+    let (has_sides, root) = (request.sides.is_some(), request.root.unwrap_or(Root::UNIT));
+    let mut cells = Cells { root: Some(root), sides: has_sides.then(Vec::new), ..Cells::default() };
     for (part, words) in parts {
         let part = if part.is_empty() { part } else { part + ": " };
         for word in words {
             let cell = cells.count();
             // Side bits must be valid only if they are used.
-            word::check(if with_sides { word } else { word & !3 }).map_err(|why| {
+            word::check(if has_sides { word } else { word & !3 }).map_err(|why| {
                 format!("{part}cell {cell} is the word {word:#018x}, in which {why}")
             })?;
             let octant = word::octant(word);

@@ -113,9 +113,8 @@ impl Faces {
 /// A sum over the edges of a polygon, in which the edges of a closed surface cancel, and others practically never.
 fn sum_of_edges(vertices: &[u32]) -> u64 {
     let edge = |(from, to): (u32, u32)| {
-        let mixed =
-            |a: u32, b: u32| contract::digest::mix(u64::from(a) << 32 | u64::from(b)) as u64;
-        if from < to { mixed(from, to) } else { mixed(to, from).wrapping_neg() }
+        let mix = |a: u32, b: u32| contract::digest::mix(u64::from(a) << 32 | u64::from(b)) as u64;
+        if from < to { mix(from, to) } else { mix(to, from).wrapping_neg() }
     };
     edges(vertices).map(edge).fold(0, u64::wrapping_add)
 }

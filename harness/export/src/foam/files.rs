@@ -22,9 +22,8 @@ impl Mesh {
         let faces = &self.faces;
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices = faces.vertices.corners.len() as u64;
-        let (count, internal) = (faces.count(), faces.neighbour.len());
-        let note =
-            format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");
+        let (count, inner) = (faces.count(), faces.neighbour.len());
+        let note = format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{inner}");
         let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
             let mut file = ListFile::create(dir, is_wide, ["labelList", object, note])?;
             file.labels(labels.len() as u64, labels)?;

@@ -133,27 +133,23 @@ impl Default for Zlib {
 
 impl Zlib {
     /// Appends an array of values.
-    fn append<T: NoUninit>(
-        &mut self,
-        mut values: impl ExactSizeIterator<Item = T>,
-        out: &mut Vec<u8>,
-    ) {
+    fn append<T: NoUninit>(&mut self, mut all: impl ExactSizeIterator<Item = T>, to: &mut Vec<u8>) {
         const { assert!(BLOCK.is_multiple_of(size_of::<T>())) };
-        let bytes = values.len() * size_of::<T>();
+        let bytes = all.len() * size_of::<T>();
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
-        let header = out.len();
-        out.resize(header + 8 * (numbers.len() + numbers[0]), 0);
+        let header = to.len();
+        to.resize(header + 8 * (numbers.len() + numbers[0]), 0);
         for begin in (0..bytes).step_by(BLOCK) {
             let block = &mut self.block[..BLOCK.min(bytes - begin)];
-            let slots = block.chunks_exact_mut(size_of::<T>()).zip(&mut values);
+            let slots = block.chunks_exact_mut(size_of::<T>()).zip(&mut all);
             slots.for_each(|(slot, value)| slot.copy_from_slice(bytemuck::bytes_of(&value)));
-            let start = out.len();
-            out.resize(start + self.compressor.zlib_compress_bound(block.len()), 0);
-            let written = self.compressor.zlib_compress(block, &mut out[start..]);
+            let start = to.len();
+            to.resize(start + self.compressor.zlib_compress_bound(block.len()), 0);
+            let written = self.compressor.zlib_compress(block, &mut to[start..]);
             numbers.push(written.expect("the bound suffices"));
-            out.truncate(start + numbers[numbers.len() - 1]);
+            to.truncate(start + numbers[numbers.len() - 1]);
         }
-        for (slot, number) in out[header..].chunks_exact_mut(8).zip(numbers) {
+        for (slot, number) in to[header..].chunks_exact_mut(8).zip(numbers) {
             slot.copy_from_slice(&(number as u64).to_le_bytes());
         }
     }

@@ -73,14 +73,13 @@ fn over_cells(
     [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (mesh, mut repetitions) = (subject.mesh(), repetitions(all, &value));
+    let (mesh, mut runs) = (subject.mesh(), repetitions(all, &value));
     if id != "memory" {
-        repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
+        runs.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
     }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
     let (id, title) = (format!("{id}-{}", subject.file()), format!("{title}: {mesh}"));
-    let caption =
-        format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
+    let caption = format!("{what} of {engines} over the number of cells of {mesh}{which}. {runs}");
     let (x, y) = (Axis::log("cells"), Axis::log(y));
     Figure { id, title, caption, x, y, series: series(all, value), ..Figure::default() }
 }

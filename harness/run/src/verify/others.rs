@@ -123,9 +123,8 @@ impl CaseRun<'_> {
         let mesh = self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh;
         match self.balance_by_p4est(&base.words) {
             Ok(words) => {
-                let compared =
-                    identical::compare(&sideless(&mesh.words), &words, &base.manifest.root);
-                Ok(Check::of_result(subject, CheckResult { name, ..compared }))
+                let diff = identical::compare(&sideless(&mesh.words), &words, &base.manifest.root);
+                Ok(Check::of_result(subject, CheckResult { name, ..diff }))
             }
             Err(Failure { end: End::Exited { code: EXIT_TOO_DEEP, .. }, .. }) => {
                 left_out("the base tree has leaves of level 19, p4est stops at 18".to_owned())
@@ -187,8 +186,7 @@ pub fn proven(
 /// Counts the votes.
 fn count(step: Step, case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
     let parity = Parity::new(&case.facets_lattice);
-    let mesh: Vec<bool> =
-        sample.words.iter().map(|&leaf| word::side(leaf) == Side::Inside).collect();
+    let mesh: Vec<bool> = sample.words.iter().map(|&w| word::side(w) == Side::Inside).collect();
     // Whether a leaf's centroid is inside by all exact rays, unless they disagree.
     let unanimous = |&leaf: &u64| {
         let rays = parity.inside(word::octant(leaf).centre());
