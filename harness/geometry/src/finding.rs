@@ -31,7 +31,7 @@ pub enum Kind {
     Intersections,
     /// Facets with two solids, four, ... on their inner side.
     Overlaps,
-    /// Facets with an opposite facet less than [`sheets::RESOLVED`](super::sheets::RESOLVED) cells away, on the inner side, but not of another solid; by rays.
+    /// Facets with an opposite facet less than [`sheets::RESOLVED`](super::sheets::RESOLVED) cells away, or one where that side is not meshed, on the inner side, but not of another solid; by rays.
     ThinWalls,
     /// The same on the outer side.
     ThinGaps,
@@ -201,7 +201,7 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         ),
         // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
         Kind::Openings => format!(
-            "At least one cell wide, where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
+            "At least one cell wide, by an upper bound where the rim is not flat, and where a box is finer one of its cells: {} of {}, the widest {}. {meaning} Below 3.5 cells that \
              depends on the position in the lattice. Close it or mesh with a greater spacing, in the box if one is finer. Where the rim is not flat, less may pass than its width: harness leak measures it. The rim of a sheet counts, too; a sheet has no inside.",
             finding.count_changing, finding.count, number(width)
         ),
@@ -278,7 +278,7 @@ mod tests {
                 14.0,
                 2,
                 true,
-                "At least one cell wide, where a box is finer one of its cells: 2 of 3, the widest 14.0",
+                "At least one cell wide, by an upper bound where the rim is not flat, and where a box is finer one of its cells: 2 of 3, the widest 14.0",
             ),
         ] {
             let text = of_width(Kind::Openings, width, changing, with_cell);

@@ -186,7 +186,9 @@ fn free_width(points: &[[f64; 3]]) -> (f64, bool) {
     };
     let segments = points.chunks_exact(2).map(|ends| ends[1] - ends[0]);
     let longest = segments.max_by(|a, b| a.length().total_cmp(&b.length())).unwrap_or(along);
-    (seen_along(u).min(seen_along(longest.normalize_or(u))), true)
+    let between_lines = u * best.1.cos() - v * best.1.sin();
+    let ways = [u, between_lines, longest.normalize_or(u)];
+    (ways.map(seen_along).into_iter().fold(f64::MAX, f64::min), true)
 }
 
 #[cfg(test)]

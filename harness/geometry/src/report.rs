@@ -1,11 +1,11 @@
-//! The result of a diagnosis as data, as JSON of the schema `octree-geometry/6` when serialised, and for a terminal.
+//! The result of a diagnosis as data, as JSON of the schema `octree-geometry/7` when serialised, and for a terminal.
 //!
 //! Invariants, which [`Diagnosis::check_invariants`] executes:
 //! - edges by class sum to all, and three times the facets of shells to the facets at edges;
 //! - shells have no more facets than the geometry; all shells are closed iff no edge has an odd number of facets;
 //! - findings of edges agree with these counts; no finding occurs more often than there are edges, shells or facets that it can concern;
 //! - places are no more than occurrences, of existing facets; openings are listed from the widest; the width of a sheet is positive and less
-//!   than a cell;
+//!   than [`RESOLVED`] cells;
 //! - what changes the region is part of what occurs, and a body beyond the root is found there.
 
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -20,7 +20,7 @@ use super::input::Extent;
 use super::sheets::RESOLVED;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-geometry/6";
+pub const SCHEMA: &str = "octree-geometry/7";
 
 /// The shells in numbers.
 #[derive(Clone, Debug, Serialize)]

@@ -25,8 +25,8 @@ pub const RESOLVED: f64 = 4.0 / 1.732;
 /// The cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
 
-/// Rays on each side per area of the surface, at least: so many for all of it, unless they are a cell apart.
-const STARTS: f64 = 1e5;
+/// Rays on each side per area of the surface: so many for all of it, unless they are a cell apart or too many facets are near them.
+const STARTS: f64 = 1e4;
 
 /// The quantile of the width that is reported, by area.
 const QUANTILE: f64 = 0.05;
@@ -92,10 +92,12 @@ fn hits(
         let cell = cell_at((a + b + c) / 3.0);
         let is_large = triangle.edges().iter().any(|edge| edge.length() > cell);
         let parts = triangle.area() / part.max(cell * cell);
-        let rows = (parts.sqrt().ceil() as u32).max(if is_large { 2 } else { 1 });
+        // Every facet has a few rays; more are as many as take the same time.
+        let more = if visits.get() < tree.visits_max { parts.sqrt().ceil() as u32 } else { 1 };
+        let rows = more.max(if is_large { 2 } else { 1 });
         // The centres of equal parts, row by row from the first vertex. Every other part is upside down.
         for (row, at) in (0..rows).flat_map(|row| (0..=2 * row).map(move |at| (row, at))) {
-            if visits.get() > tree.visits_max {
+            if visits.get() > 2 * tree.visits_max {
                 return (hits, true);
             }
             let turned = f64::from(at % 2);

@@ -21,7 +21,8 @@ pub struct FacetTree {
     boxes: Bvh,
     /// The numbers of all facets but copies, in ascending order.
     pub firsts: Vec<u32>,
-    /// A search from all facets ends when it has visited this number of others: seconds, unless most facets are close to most others.
+    /// A search from all facets ends when it has visited this number of others, or twice as many where it could do with less: seconds, unless
+    /// most facets are close to most others.
     pub visits_max: u64,
 }
 

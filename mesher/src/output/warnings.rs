@@ -6,8 +6,8 @@ use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
 use bricks::octant::ROOT_EDGE;
 
-const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
-    leaks through an opening that is wider than a cell: close the openings that `harness leak CASE --from X,Y,Z` finds from a point in the flow, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
+const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise a \
+    seed lies beyond the body, or it leaks through an opening that is wider than a cell: move the seed, close the openings that `harness leak CASE --from X,Y,Z` finds from a point in the flow, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
 const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
     to the far field, or set keep = inside if the flow is internal";
 const BOXES_WITHOUT_EFFECT: &str =

@@ -666,7 +666,7 @@ fn facets_on_and_beyond_the_root_are_found() {
 fn json_has_the_schema_and_text_the_findings() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
-    assert_eq!(json["schema"], "octree-geometry/6");
+    assert_eq!(json["schema"], "octree-geometry/7");
     assert_eq!(json["findings"][0]["kind"], "openings");
     assert_eq!(json["findings"][0]["places"][0]["width"], 2.0);
     let text = found.to_string();

@@ -107,7 +107,7 @@ pub fn tex(numbers: &[Number]) -> String {
 /// the first commands begins an interval or a short title. Before a word, `in` is one as well.
 const NOT_READ: [&str; 5] = [
     r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
-    r"\\(?:[a-zA-Z]*(?:label|ref|cite)|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
+    r"\\(?:[a-zA-Z]*(?:label|ref|cite|input|url)|include|result|includegraphics|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"\\[a-zA-Z]+\*?\[[^\]\n]*\]|[}\]]\[[^\]\n]*[a-zA-Z!][^\]\n]*\]",
     r"\\definecolor\s*(?:\{[^}]*\}\s*){3}",
     r"[0-9.]+(?:[ \t]*(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
