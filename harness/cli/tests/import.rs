@@ -67,10 +67,11 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
 #[test]
 fn unknown_sides_do_not_become_known() {
     let place = tempfile::tempdir().unwrap();
-    let [mesh, tree, forest, again] = ["mesh", "mesh.vtkhdf", "mesh.p8est", "again"]
-        .map(|name| place.path().join(name).to_str().unwrap().to_owned());
+    let [mesh, tree, front, forest, again] =
+        ["mesh", "mesh.vtkhdf", "front.stl", "mesh.p8est", "again"]
+            .map(|name| place.path().join(name).to_str().unwrap().to_owned());
     assert_eq!(result(&["import", &sample("unitcube.p8est"), "--out", &mesh]).0, 0);
-    for arguments in [["export", &mesh, &tree], ["export", &mesh, "front.stl"]] {
+    for arguments in [["export", &mesh, &tree], ["export", &mesh, &front]] {
         let (code, _, error) = result(&arguments);
         assert!(code == 2 && error.contains("sides of this mesh are unknown"), "{error}");
     }
