@@ -6,8 +6,11 @@ use contract::octant::LEVEL_MAX;
 use serde::Serialize;
 
 use super::input::Input;
-use super::sheets::RESOLVED;
 use super::tree::bounds;
+
+/// Cells within which a gap holds one of them wherever it lies in the lattice: 2 if it is parallel to a face of the lattice, and this across
+/// its diagonal.
+pub const RESOLVED: f64 = 4.0 / 1.732;
 
 /// Kinds of findings, in the order of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -31,7 +34,8 @@ pub enum Kind {
     Intersections,
     /// Facets with two solids, four, ... on their inner side.
     Overlaps,
-    /// Facets with an opposite facet less than [`sheets::RESOLVED`](super::sheets::RESOLVED) cells away, or one where that side is not meshed, on the inner side, but not of another solid; by rays.
+    /// Facets with an opposite facet on the inner side, but not of another solid, less than [`RESOLVED`] cells away, or one if that side is
+    /// not meshed; by rays.
     ThinWalls,
     /// The same on the outer side.
     ThinGaps,

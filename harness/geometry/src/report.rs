@@ -15,9 +15,8 @@ use serde::Serialize;
 use std::fmt;
 
 use super::edges::EdgeCounts;
-use super::finding::{Finding, Kind, Place};
+use super::finding::{Finding, Kind, Place, RESOLVED};
 use super::input::Extent;
-use super::sheets::RESOLVED;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-geometry/7";

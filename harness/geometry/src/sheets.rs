@@ -13,14 +13,10 @@ use parry3d_f64::query::Ray;
 use std::cell::Cell;
 use std::collections::HashSet;
 
-use super::finding::{Finding, Kind, Place};
+use super::finding::{Finding, Kind, Place, RESOLVED};
 use super::input::Input;
 use super::shells::Shells;
 use super::tree::{Aabb, FacetTree, Point, TOUCHING};
-
-/// Cells within which a gap holds one of them wherever it lies in the lattice: 2 if it is parallel to a face of the lattice, and this across
-/// its diagonal.
-pub const RESOLVED: f64 = 4.0 / 1.732;
 
 /// The cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;

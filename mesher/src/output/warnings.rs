@@ -48,7 +48,7 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let Mesh { rules, facets, sides, .. } = mesh;
         let empty = empty_region(rules.keep, &sides.summary);
-        // Nothing but an opening joins what surrounds all facets with what rays, or seeds, take for the inside.
+        // Nothing but an opening joins what surrounds all facets with what rays take for the inside, unless a seed lies there.
         let is_around = facets.margin > 0 && sides.summary.inside_reaches_boundary;
         return match mesh.bounds_nothing {
             _ if is_around && rules.seeds.is_empty() => Some(format!(

@@ -66,17 +66,19 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
     for (tree, quadrants) in forest.leaves.iter().enumerate() {
         let (mut next, mut leaves) = (0, Vec::with_capacity(quadrants.len()));
         for (index, quadrant) in quadrants.iter().enumerate() {
-            let it = || named(tree, index, quadrant);
+            let name = || named(tree, index, quadrant);
             let Some(leaf) = leaf(dimension, length, quadrant) else {
-                let it = it();
-                valid.report(format_args!("{it} is no octant of a tree whose length is {length}"));
+                let name = name();
+                valid
+                    .report(format_args!("{name} is no octant of a tree whose length is {length}"));
                 continue;
             };
             if leaf.key < next {
-                linear.report(format_args!("{} begins before the end of the one before it", it()));
+                linear
+                    .report(format_args!("{} begins before the end of the one before it", name()));
             } else if leaf.key > next {
                 let why = "does not begin where the one before it ends, or the tree begins";
-                complete.report(format_args!("{} {why}", it()));
+                complete.report(format_args!("{} {why}", name()));
             }
             next = leaf.key + (1 << (dimension * leaf.size().trailing_zeros() as usize));
             leaves.push(leaf);

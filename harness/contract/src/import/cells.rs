@@ -63,8 +63,9 @@ impl Cells {
         self.agree_with_levels(&in_order)?;
         let mut words = in_order.clone();
         words.sort_unstable();
-        let clash = |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
-        let Some(pair) = words.windows(2).find(clash) else { return Ok(words) };
+        let overlaps =
+            |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
+        let Some(pair) = words.windows(2).find(overlaps) else { return Ok(words) };
         let both = (0..self.count()).filter(|&i| pair.contains(&in_order[i])).map(cell);
         let both: Vec<String> = both.collect();
         Err(Failure::input(format!("{} overlaps {}: remove one of them", both[1], both[0])))

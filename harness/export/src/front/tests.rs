@@ -56,6 +56,22 @@ fn the_triangles_of_a_file_are_as_closed_as_the_polygons() {
     assert!((volume - 0.125).abs() < 1e-6, "{volume}");
 }
 
+/// Cells are 0.99 wide, and f32 numbers near 1e4 and 1e6 are 0.001 and 0.06 apart.
+#[test]
+fn numbers_that_would_move_corners_are_refused() {
+    let words =
+        words_with_sides(|o| o.level < 3, |o| (o.corner[2] >> 16 != 3).then_some(Side::Outside));
+    for (x, is_resolved) in [(1e4, true), (1e6, false)] {
+        let root = Root { origin: [x, 0.0, 0.0], edge: 7.92 };
+        let (dir, mesh) = in_root(&words, 1, |_| 0, root);
+        let path = dir.path().join("front.stl");
+        let written = stl(&whole(&mesh), &path);
+        let refusal = written.err().map_or(String::new(), |failure| failure.to_string());
+        assert_eq!(refusal.contains("which do not resolve the faces"), !is_resolved, "{refusal}");
+        assert_eq!(path.exists(), is_resolved);
+    }
+}
+
 /// Level of the finest cells of the random meshes.
 const LEVEL: u8 = 4;
 

@@ -73,13 +73,14 @@ fn over_cells(
     [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (mesh, mut runs) = (subject.mesh(), repetitions(all, &value));
+    let (mesh, mut repetitions) = (subject.mesh(), repetitions(all, &value));
     if id != "memory" {
-        runs.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
+        repetitions.extend(clocks(all.iter().copied()).map(|clocks| format!(" {clocks}")));
     }
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
     let (id, title) = (format!("{id}-{}", subject.file()), format!("{title}: {mesh}"));
-    let caption = format!("{what} of {engines} over the number of cells of {mesh}{which}. {runs}");
+    let caption =
+        format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
     let (x, y) = (Axis::log("cells"), Axis::log(y));
     Figure { id, title, caption, x, y, series: series(all, value), ..Figure::default() }
 }
