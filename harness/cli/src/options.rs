@@ -183,6 +183,9 @@ impl MeshArguments {
         let engine = Engine::find(name, self.mesher.as_deref(), &paths)?;
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         let case = Case::read(&path)?;
+        if let Some(why) = engine.description.declines(&case) {
+            return Err(Failure::missing(format!("left out: {why}")));
+        }
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
         let limit = self.timeout.unwrap_or(Duration::from_secs(600));

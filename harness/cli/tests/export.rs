@@ -74,6 +74,8 @@ fn conditions_of_a_selection_must_all_hold() {
 #[test]
 fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
     let place = mesh();
+    fs::create_dir(place.path().join("mesh/b")).unwrap();
+    fs::write(place.path().join("mesh/b/mesh.json"), "{}").unwrap();
     for (file, options, expected) in [
         (
             "mesh.png",
@@ -81,6 +83,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
             "mesh.png: no format has such a name: choose one that ends in .vtu, .p8est",
         ),
         ("mesh/all.vtkhdf", &[], "mesh/all.vtkhdf: it would be a part of the mesh"),
+        ("mesh/b/mesh.vtkhdf", &[], "mesh/b/mesh.vtkhdf: it would be a part of the mesh"),
         ("none/mesh.vtu", &[], "none/mesh.vtu: none is not a directory: create it"),
         ("part.vtu", &["--side", "outside", "--level-max", "2"], "no leaf satisfies"),
         ("part.vtkhdf", &["--side", "outside", "--level-max", "2"], "no leaf satisfies"),

@@ -273,8 +273,8 @@ fn a_promise_about_nothing_is_not_kept() {
         .write("simulated.toml", &FOREST.replace("parallel = [\"{launcher}\", ", "simulated = ["));
     copying(&fixture, "unitcube");
     let verified = fixture.harness("verify case.toml --engine simulated.toml");
-    assert!(verified.printed.contains("ranks: "), "{}", verified.printed);
-    assert!(verified.printed.contains("1 left out"), "{}", verified.printed);
+    let is_named = verified.printed.contains("has no command `parallel`");
+    assert_eq!((verified.code, is_named), (3, true), "{}", verified.printed);
 }
 
 /// The mesh on each number of ranks is checked if it may be another one.
@@ -488,6 +488,47 @@ fn a_case_that_the_engine_declines_is_left_out_by_every_command() {
         let required = fixture.harness(&format!("{command} {require}"));
         assert_eq!(required.code, 3, "{command} {require}: {}", required.printed);
     }
-    let shrink = fixture.harness("shrink case.toml --engine foreign.toml");
-    assert_eq!((shrink.code, shrink.printed.contains(why)), (3, true), "{}", shrink.printed);
+    for command in ["shrink case.toml", "why case.toml 1,1,1", "picture case.toml --out a.svg"] {
+        let outcome = fixture.harness(&format!("{command} --engine foreign.toml"));
+        assert_eq!((outcome.code, outcome.printed.contains(why)), (3, true), "{}", outcome.printed);
+    }
+}
+
+#[test]
+fn a_digest_is_a_claim_about_leaves() {
+    let fixture = Fixture::new();
+    fixture.engine("right", "complete = true\ndeterministic = true");
+    assert_eq!(fixture.verify("--no-mpi --out out --keep").code, 0);
+    // From now on the first run writes another side under the same manifest.
+    let copy = "cp -r \"$here/out/case/serial/mesh/.\" \"$2\"";
+    let lie = "[ -e \"$here/seen\" ] || cp \"$here/sides.npy\" \"$2/leaves-00000.npy\"; touch \"$here/seen\"";
+    fixture.script(
+        "engine",
+        &format!("#!/bin/sh\nhere=$(dirname \"$0\"); mkdir -p \"$2\"\n{copy}\n{lie}\n"),
+    );
+    let verified = fixture.verify("--no-mpi");
+    assert!(failed(&verified, "serial: runs: foreign wrote a mesh"), "{}", verified.printed);
+    assert!(verified.printed.contains("its leaves have the digest"), "{}", verified.printed);
+}
+
+#[test]
+fn what_could_not_be_tried_is_not_green() {
+    let fixture = Fixture::new();
+    fixture.engine("right", "complete = true");
+    let engine = fs::read_to_string(fixture.path("foreign.toml")).unwrap();
+    fixture.script("copy", "#!/bin/sh\ncp \"$0\" \"$1\"\n");
+    for (engine, why) in [
+        (
+            engine
+                .replace("engine\", \"{case}\", \"{out}", "copy\", \"{out}.vtu")
+                .replace("[run]", "[run]\nformat = 'vtk'"),
+            "which needs Python at ",
+        ),
+        (engine.replace("{here}/engine", "{here}/case.toml"), "cannot be started: "),
+    ] {
+        fixture.write("foreign.toml", &engine);
+        let outcome = fixture.verify("--no-mpi");
+        let is_named = outcome.printed.contains(why);
+        assert_eq!((outcome.code, is_named), (3, true), "{engine}{}", outcome.printed);
+    }
 }

@@ -70,7 +70,8 @@ fn numbers(Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<Stri
     let measured = run.map(|run| {
         let cells = run.cells as f64;
         let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
-        let memory = run.peak_rss_bytes.map(|peak| format!("{:.1}", peak as f64 / cells.max(1.0)));
+        let memory = run.peak_rss_bytes.filter(|_| run.cells > 0);
+        let memory = memory.map(|peak| format!("{:.1}", peak as f64 / cells));
         let rate = Some(format!("{:.3}", cells / run.time_wall_s.max(1e-9) / 1e6));
         [time_s, rate, memory].map(|number| number.unwrap_or("-".to_owned()))
     });

@@ -207,7 +207,7 @@ impl<'a> Problem<'a> {
         let mut pilots = Vec::new();
         let (mut coarser, mut before) = (None, false);
         for shift in (0..=first).rev() {
-            let (amounts, is_without_seeds) = run(shift)?;
+            let (amounts, is_unseeded) = run(shift)?;
             let ranks = Ranks::gather(self.comm, amounts);
             let amounts = ranks.total();
             pilots.push(PilotEntry {
@@ -216,12 +216,14 @@ impl<'a> Problem<'a> {
                 time_cpu_s: amounts.time_cpu_s(),
             });
             let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed };
-            if shift == 0 || coarser.is_some() && pilot.at(shift - shift.min(1)).cells > cells_max {
+            let next = shift - shift.min(1);
+            // A pilot also makes the cells in boxes that it deletes.
+            let cells = pilot.at(next).cells.max(rough_boxed / 8f64.powi(next as i32));
+            if shift == 0 || coarser.is_some() && cells > cells_max {
                 let plan = self.plan_of(pilots, &pilot, &ranks);
-                let is_without_seeds = is_without_seeds || before && shift > 0;
-                return Ok(Plan { is_without_seeds, ..plan });
+                return Ok(Plan { is_without_seeds: is_unseeded || before && shift > 0, ..plan });
             }
-            (coarser, before) = (Some(amounts), is_without_seeds);
+            (coarser, before) = (Some(amounts), is_unseeded);
         }
         unreachable!("the last pilot is the run itself")
     }

@@ -6,7 +6,7 @@
 //! overlap, and with slower terms for the far field. Two pilot runs give the first term and one for all others, whose base lies
 //! between 2 and 1 for the slower ones.
 
-use bricks::brick;
+use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::octant::{Level, corner, edge};
 use bytemuck::{Pod, Zeroable};
@@ -109,8 +109,8 @@ pub struct Pilot {
     pub cells_boxed: f64,
 }
 
-/// Bytes per cell of a box while sides are decided and in gradation: those of its bricks and their ancestors.
-const BYTES_PER_CELL_BOXED: [f64; 2] = [0.36, 0.05];
+/// Bytes per cell of a box, those of its bricks and their ancestors: while sides are decided, and more then if it is kept, and in gradation.
+const BYTES_PER_CELL_BOXED: [f64; 3] = [0.25, 0.11, 0.05];
 /// A visit of each brick of 64 cells.
 const TESTS_PER_CELL_BOXED: f64 = 1.0 / (64.0 * VISITS_PER_TEST);
 
@@ -121,24 +121,25 @@ impl Pilot {
         if shift == self.shift {
             return fine;
         }
-        let cells_boxed = (self.cells_boxed - fine.cells_boxed_deleted).max(0.0);
+        // Refinement and sides see those that are deleted, too.
+        let (all, kept) =
+            (self.cells_boxed, (self.cells_boxed - fine.cells_boxed_deleted).max(0.0));
         let further = self.shift as i32 - shift as i32;
-        // Extrapolates one quantity, of which a cell in a box has `per_cell`.
-        let grown = |of: fn(&Amounts) -> f64, per_cell: f64| {
-            let boxed = |shift: Level| per_cell * cells_boxed / 8f64.powi(shift as i32);
-            let shell =
-                |at: Level, amounts: &Amounts| (of(amounts) - boxed(at)).max(0.05 * of(amounts));
+        // Extrapolates one quantity, of which the boxes have so much at the case's own spacing.
+        let grown = |of: fn(&Amounts) -> f64, of_boxes: f64| {
+            let boxed = |shift: Level| of_boxes / 8f64.powi(shift as i32);
+            let shell = |at, all: &Amounts| (of(all) - boxed(at)).max(0.05 * of(all));
             let coarse = self.coarser.map(|c| shell(self.shift + 1, &c));
             shell_at(further, shell(self.shift, &fine), coarse) + boxed(shift)
         };
-        let cells = grown(|a| a.cells, 1.0);
-        let tests = grown(|a| a.tests, TESTS_PER_CELL_BOXED);
-        let [per_cell_sides, per_cell_graded] = BYTES_PER_CELL_BOXED;
+        let cells = grown(|a| a.cells, kept);
+        let tests = grown(|a| a.tests, all * TESTS_PER_CELL_BOXED);
+        let [of_all, of_kept, graded] = BYTES_PER_CELL_BOXED;
         Amounts {
             cells,
             tests,
-            bytes_sides: grown(|a| a.bytes_sides, per_cell_sides),
-            bytes_graded: grown(|a| a.bytes_graded, per_cell_graded),
+            bytes_sides: grown(|a| a.bytes_sides, all * of_all + kept * of_kept),
+            bytes_graded: grown(|a| a.bytes_graded, kept * graded),
             time_refine_s: fine.time_refine_s * tests / fine.tests.max(1.0),
             time_cells_s: fine.time_cells_s * cells / fine.cells.max(1.0),
             ..fine
@@ -184,16 +185,16 @@ pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
 
 /// The cells that boxes ask for in deleted leaves that this rank owns.
 fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
-    let mut cells = 0.0;
-    for (l, deleted) in (0..).zip(mesh.sides.deleted()) {
-        for b in mesh.ownership.owned(l, deleted) {
+    let of_brick = |l: Level, b: Brick| match b.bits {
+        // A full brick is one octant.
+        u64::MAX => boxed_in(boxes, l - 2, b.key),
+        _ => {
             let near = near(boxes, brick::min_corner(l, b.key), 4 * edge(l));
-            if !near.is_empty() {
-                cells += b.codes().map(|code| boxed_in(&near, l, code)).sum::<f64>();
-            }
+            b.codes().map(|code| boxed_in(&near, l, code)).sum::<f64>()
         }
-    }
-    cells
+    };
+    let bricks_of = |l, deleted| mesh.ownership.owned(l, deleted).map(move |b| of_brick(l, b));
+    (0..).zip(mesh.sides.deleted()).flat_map(|(l, deleted)| bricks_of(l, deleted)).sum()
 }
 
 #[cfg(test)]
@@ -228,15 +229,15 @@ mod tests {
         let tiny = [0.5, 0.0, 0.25, 40.0, 50.0, 1.0, 1.0, 1.0];
         #[rustfmt::skip]
         let expected = [
-            (2, fine, Some(coarse), 6e7, 0, [150128554.6875, 2000000.0, 1198307.37304688, 89946579.6875, 96146302.734375, 7.9887158203125, 83.4047526041667, 7.0]),
+            (2, fine, Some(coarse), 6e7, 0, [150128554.6875, 2000000.0, 1204223.14453125, 90279304.296875, 96146302.734375, 8.028154296875, 83.4047526041667, 7.0]),
             (2, fine, Some(coarse), 6e7, 2, [9000000.0, 2000000.0, 300000.0, 8000000.0, 9000000.0, 2.0, 5.0, 7.0]),
-            (2, fine, Some(coarse), 6e7, 3, [3000000.0, 2000000.0, 160985.338365709, 3200000.0, 3400000.0, 1.07323558910473, 1.66666666666667, 7.0]),
-            (2, fine, None, 6e7, 0, [187500000.0, 2000000.0, 4935937.5, 143660000.0, 146175000.0, 32.90625, 104.166666666667, 7.0]),
-            (3, fine, Some(odd), 1000000.0, 0, [56984625.0, 2000000.0, 1899487.5, 903018405.0, 1020609760.0, 12.66325, 31.658125, 7.0]),
+            (2, fine, Some(coarse), 6e7, 3, [3000000.0, 2000000.0, 160944.758234797, 3200000.0, 3400000.0, 1.07296505489865, 1.66666666666667, 7.0]),
+            (2, fine, None, 6e7, 0, [187500000.0, 2000000.0, 4940625.0, 144035000.0, 146175000.0, 32.9375, 104.166666666667, 7.0]),
+            (3, fine, Some(odd), 1000000.0, 0, [56984625.0, 2000000.0, 1902573.85482788, 903225040.345459, 1020609760.0, 12.6838256988525, 31.658125, 7.0]),
             (1, tiny, None, 0.0, 0, [2.0, 0.0, 1.0, 160.0, 200.0, 1.0, 2.0, 1.0]),
-            (1, coarse, Some(fine), 4000000.0, 4, [454313.98841289, 3000000.0, 31526.5363388569, 498380.193153972, 536012.049093912, 0.0788163408471423, 0.189297495172038, 6.0]),
-            (2, fine, Some(coarse), 6e9, 0, [6003576625.0, 2000000.0, 18795087.5, 2163082600.0, 314664878.90625, 125.300583333333, 3335.32034722222, 7.0]),
-            (2, fine, Some(coarse), 6e9, 3, [11864843.75, 2000000.0, 44716.9948268581, 4377343.75, 2917667.86317568, 0.298113298845721, 6.59157986111111, 7.0]),
+            (1, coarse, Some(fine), 4000000.0, 4, [454313.98841289, 3000000.0, 31343.7423388245, 483756.673151377, 536012.049093912, 0.0783593558470612, 0.189297495172038, 6.0]),
+            (2, fine, Some(coarse), 6e9, 0, [6003576625.0, 2000000.0, 18801337.5, 2163582600.0, 314664878.90625, 125.34225, 3335.32034722222, 7.0]),
+            (2, fine, Some(coarse), 6e9, 3, [11864843.75, 2000000.0, 44729.2018581081, 4378320.3125, 2917667.86317568, 0.298194679054054, 6.59157986111111, 7.0]),
         ];
         for (shift, fine, coarser, cells_boxed, at, expected) in expected {
             let coarser = coarser.map(amounts);

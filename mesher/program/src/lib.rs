@@ -128,7 +128,7 @@ impl Keys {
 fn explain(text: &str, e: &toml::de::Error) -> String {
     let before = e.span().map_or("", |s| &text[..s.start]);
     let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
-    let message = message.replace("expected u32", "expected a whole number");
+    let message = message.replace("expected u32", "expected a whole number up to 4294967295");
     format!("line {}: {message}", before.matches('\n').count() + 1)
 }
 

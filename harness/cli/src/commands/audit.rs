@@ -4,6 +4,7 @@ use super::import::Source;
 use crate::options::{Input, Output, examples};
 use crate::output::put_forms;
 use check::audit::{AuditReport, audit_against};
+use check::checks::CheckResult;
 use check::forest;
 use check::promises::{Promises, Touching};
 use clap::Args;
@@ -60,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         let why = "quadrants have no edges but their faces: choose --balance faces or corners";
         Failure::unless(has_edges || *balance != Some(Touching::Edge), why)?;
         let report = forest::audit(&forest, balance.unwrap_or(Touching::Corner), start);
-        return publish(&report, arguments);
+        return publish(&report, arguments, EXIT_HOLDS);
     }
     let engine = promises.as_deref().map(promising).transpose()?;
     let case = source.read_case()?;
@@ -83,12 +84,18 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let checker = &paths.proven_checker;
     let proof = |base: &Input| proven(checker, (directory, base), report.leaves, LIMIT);
     let proof = proved.as_ref().map(proof).transpose();
-    let unproven = proof.map(|proof| report.checks.extend(proof)).map_err(Failure::from);
-    let mut code = publish(&report, arguments)?;
-    if let Err(Failure { code: of_proof, why }) = unproven {
-        println!("left out: proof: {why}");
-        code = exit_first(code, of_proof);
+    let mut code_of_proof = EXIT_HOLDS;
+    match proof {
+        Ok(proof) => report.checks.extend(proof),
+        Err(failure) => {
+            let Failure { code, why } = failure.into();
+            code_of_proof = code;
+            let mut left_out = CheckResult::new("proof");
+            left_out.lacks(why);
+            report.checks.push(left_out);
+        }
     }
+    let code = publish(&report, arguments, code_of_proof)?;
     let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
     if opened.made.is_some() && case.is_none() && has_holes {
         eprintln!(
@@ -98,8 +105,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Ok(code)
 }
 
-/// Prints the report, and writes it if that is asked for; returns the exit code.
-fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8> {
+/// Prints the report, and writes it if that is asked for; returns the exit code, if that of the proof is this one.
+fn publish(report: &AuditReport, arguments: &Arguments, code_of_proof: u8) -> Result<u8> {
     report.check_invariants();
     println!("{report}");
     let not_run = || report.not_run().next().is_some();
@@ -109,7 +116,9 @@ fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8> {
         () if is_incomplete || arguments.require_checks && not_run() => EXIT_MISSING,
         () => EXIT_HOLDS,
     };
-    put_forms(code, &[(arguments.json.as_deref(), &|| report.json())], None)
+    let code = exit_first(code, code_of_proof);
+    let json = || report.json(code == EXIT_HOLDS);
+    put_forms(code, &[(arguments.json.as_deref(), &json)], None)
 }
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.

@@ -3,6 +3,7 @@
 use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure, Result, progress};
+use contract::manifest;
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS};
 use export::options::{Export, Regions, Summary};
@@ -53,8 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         files::check_writable(file).map_err(|error| Failure::at(file, error))?;
     }
     let case = case.as_deref().map(read_case).transpose()?;
-    let dir = file.parent().and_then(|dir| dir.join(".").canonicalize().ok());
-    let is_part = format.ending == ".vtkhdf" && dir.is_some() && dir == mesh.canonicalize().ok();
+    let is_of_mesh = file.parent().is_some_and(|dir| dir.join(manifest::FILE).exists());
+    let is_part = format.ending == ".vtkhdf" && is_of_mesh;
     let why = "it would be a part of the mesh, in whose directory it is: name another one";
     Failure::unless(!is_part, format!("{}: {why}", file.display()))?;
     let mesh = Mesh::open(mesh)?;

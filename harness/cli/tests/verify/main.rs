@@ -8,6 +8,7 @@ mod fixture;
 use fixture::{Fixture, HANGS, HOLDS, REFUSES};
 use quick_junit::{Report, TestCaseStatus};
 use std::fs;
+use std::process::Command;
 
 #[test]
 fn a_correct_mesher_passes() {
@@ -264,6 +265,11 @@ fn a_wrong_digest_in_manifest_and_report_on_ranks_is_reported() {
         "2 ranks, morton, base auto; 3 ranks, morton, base auto: manifest: digest: \"{digest}\" in the"
     );
     assert!(outcome.printed.contains(&why), "{}", outcome.printed);
+    // The ranks have the right digest, and the serial runs agree on a wrong one.
+    fixture.script("mesher", &format!("{HOLDS}\n{}", lie.replace("-z", "-n")));
+    let outcome = fixture.verify(&[]);
+    let why = format!("serial; base tree: manifest: digest: \"{digest}\" in the");
+    assert_eq!((outcome.code, outcome.printed.contains(&why)), (1, true), "{}", outcome.printed);
 }
 
 /// Each process of another MPI's launcher, or of a mesher without MPI, meshes the whole case.
@@ -313,6 +319,20 @@ fn ranks_that_were_asked_for_or_promised_require_mpirun() {
     let outcome =
         fixture.harness_on(bin.to_str().unwrap(), &[&arguments[..2], &["--no-mpi"]].concat());
     assert_eq!(outcome.code, 0, "{}", outcome.printed);
+}
+
+/// As those of a shell that becomes the harness.
+#[test]
+fn processes_that_others_started_are_left_alone() {
+    let fixture = Fixture::new();
+    let script = "setsid sleep 600 >/dev/null 2>&1 & echo $! >sleeper; exec \"$@\"";
+    let verify = "verify case.toml --no-mpi --no-proof --mesher ./mesher --reference ./reference";
+    let mut command = Command::new("sh");
+    command.args(["-c", script, "sh", env!("CARGO_BIN_EXE_harness")]).args(verify.split(' '));
+    let ended = command.current_dir(fixture.path("")).output().unwrap();
+    assert!(ended.status.success(), "{ended:?}");
+    let killed = Command::new("kill").arg(fixture.read("sleeper").trim()).status();
+    assert!(killed.unwrap().success(), "{ended:?}");
 }
 
 /// Of a case that was named, nothing left out is green; of those of a size, not all.

@@ -51,7 +51,7 @@ impl Cells {
         let word = |i: usize| {
             let octant = octant(self.corners[i], self.edges[i], root).map_err(|why| {
                 format!(
-                    "{} {why}, where the root has the corner {:?} and the edge {}: correct the mesh, or the root with --root \
+                    "{} {why}, where the root has the corner {:?} and the edge {}: correct the mesh, or have it imported with --root \
                      X,Y,Z,EDGE",
                     cell(i), root.origin, root.edge
                 )

@@ -56,8 +56,7 @@ pub struct Picture {
 /// Units of the page that a map may take: its width, but for labels, and its greatest height.
 const PAGE: [f64; 2] = [1360.0, MAP_HEIGHT_MAX];
 /// Why a picture would be empty.
-const NO_LEAF: &str =
-    "no leaf of the selection is in a slice: give another --slice or a larger --clip";
+const NO_LEAF: &str = "no leaf of the selection is in a slice: give another --slice, a larger --clip or a smaller --zoom";
 
 /// The plane normal to the shortest extent of the body that halves the area of its facets, each at its centroid; without a body, normal to z through the root's
 /// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail. One beyond the clip box is

@@ -7,7 +7,7 @@
 //!   place ([`contract::files::Staging`]);
 //! - output that is about to get its final names gets all of them first.
 
-use super::session::{PATIENCE, end_all};
+use super::session::{PATIENCE, end_all, keep_children};
 use contract::failure::INTERRUPTED;
 use contract::files::publications;
 use files::OUT_OF_MEMORY;
@@ -40,6 +40,7 @@ static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
 /// # Errors
 /// If a handler cannot be installed. Without one, a signal ends the harness without cleaning up; that does not prevent a run.
 pub fn install() -> io::Result<()> {
+    keep_children();
     // Processes that an engine detaches become children of this one, which ends them.
     let _ = set_child_subreaper(Some(getpid()));
     let (mut received, sent) = UnixStream::pair()?;

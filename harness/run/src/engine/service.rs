@@ -58,8 +58,11 @@ impl Services {
         let mut services = self.0.borrow_mut();
         if let Some(service) = services.get_mut(name) {
             let ended = service.session.wait(Duration::ZERO).map_err(failure)?;
-            let Some((status, _)) = ended else { return Ok(()) };
-            let end = process::judge(status, &service.errors);
+            let end = match (service.answers.try_recv(), ended) {
+                (Ok(_), _) => Err(End::Unusable("printed more than one line for a run".to_owned())),
+                (Err(_), None) => return Ok(()),
+                (Err(_), Some((status, _))) => process::judge(status, &service.errors),
+            };
             services.remove(name);
             // A program that has ended well between two requests is started again.
             end.map_err(failure)?;
@@ -188,22 +191,23 @@ impl Drop for Service {
 mod tests {
     use super::*;
 
-    /// Answers 0 to every word but `wrong`, and `die`, at which it ends.
-    const SCRIPT: &str = r#"while read -r line; do case "$line" in *die*) exit 7 ;; *wrong*) echo 5 ;; *) echo 0 ;; esac; done"#;
+    /// Answers 0 to every word but `wrong`, and `die`, at which it ends; twice to `twice`.
+    const SCRIPT: &str = r#"while read -r line; do case "$line" in *die*) exit 7 ;; *wrong*) echo 5 ;; *twice*) echo 0; echo 0 ;; *) echo 0 ;; esac; done"#;
+
+    fn script() -> Start {
+        let mut command = Command::new("sh");
+        command.args(["-c", SCRIPT]);
+        (command, None)
+    }
 
     #[test]
     fn a_service_that_has_ended_is_started_again() {
         let place = tempfile::tempdir().unwrap();
         let services = Services::default();
-        let start = || {
-            let mut command = Command::new("sh");
-            command.args(["-c", SCRIPT]);
-            (command, None)
-        };
         let words = [("good", 0), ("die", 7), ("wrong", 5), ("good", 0)];
         for _ in 0..25 {
             for (name, (word, _)) in words.iter().enumerate() {
-                services.start(&name.to_string(), start).unwrap();
+                services.start(&name.to_string(), script).unwrap();
                 services.send(&name.to_string(), &[(*word).to_owned()]);
             }
             for (name, (_, code)) in words.iter().enumerate() {
@@ -216,6 +220,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_second_answer_is_not_that_of_the_next_request() {
+        let place = tempfile::tempdir().unwrap();
+        let services = Services::default();
+        services.start("sh", script).unwrap();
+        services.send("sh", &["twice".to_owned()]);
+        services.answer("sh", &Watch::new("sh", Duration::from_secs(60), place.path())).unwrap();
+        let mut started = Ok(());
+        wait_while(Duration::from_secs(60), || {
+            started = services.start("sh", script);
+            started.is_ok()
+        });
+        let why = "printed more than one line for a run".to_owned();
+        assert_eq!(started.unwrap_err().end, End::Unusable(why));
+        services.start("sh", script).unwrap();
     }
 
     #[test]

@@ -12,7 +12,7 @@ use std::io;
 use std::os::unix::process::CommandExt;
 use std::process::{ChildStdin, ChildStdout, Command, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, OnceLock};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 use wait4::{ResourceUsage, Wait4};
@@ -24,6 +24,14 @@ const ATTEMPTS: usize = 500;
 
 /// The leaders of all sessions.
 static RUNNING: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
+
+/// Children that this process had when it began: what a shell started before it became the harness.
+static INHERITED: OnceLock<Vec<Pid>> = OnceLock::new();
+
+/// Leaves the children alone that there are by now.
+pub(super) fn keep_children() {
+    INHERITED.get_or_init(|| adopted(&[]));
+}
 
 fn running() -> MutexGuard<'static, Vec<Pid>> {
     RUNNING.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
@@ -170,7 +178,8 @@ fn adopted(kept: &[Pid]) -> Vec<Pid> {
     });
     let own = session(0);
     let others = children.filter(|&child| session(child) != own).filter_map(Pid::from_raw);
-    others.filter(|child| !kept.contains(child)).collect()
+    let inherited = INHERITED.get().map_or(&[][..], Vec::as_slice);
+    others.filter(|child| !kept.contains(child) && !inherited.contains(child)).collect()
 }
 
 /// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container,

@@ -113,6 +113,10 @@ impl<'a> CaseRun<'a> {
         let may_refuse = self.promises().definition && layout.is_none();
         let why = match &failure.end {
             End::Interrupted => return,
+            // A program on this machine is missing: nothing is shown about the mesh.
+            End::Missing(why) if subject == "serial" => {
+                return self.leave_out(("serial", RUNS), why);
+            }
             // The code may mean anything else for a program that was not written for the harness, and on ranks after a serial run.
             End::Exited { code: CODE_INPUT, error } if may_refuse => {
                 format!("it refuses the case: {error}")

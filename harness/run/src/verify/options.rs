@@ -1,6 +1,6 @@
 //! The options of a verification, and the prerequisites, each tried once before the first case.
 
-use super::report::{CaseReport, Missing};
+use super::report::{CaseReport, Check, Missing, Outcome, RUNS};
 use crate::engine::description::Description;
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
@@ -231,15 +231,29 @@ impl Needs {
         if !unchecked.is_empty() {
             absent.insert(Need::Checks, format!("no check was run on {}", unchecked.join(", ")));
         }
+        // A program that cannot be started, or a reader of its files.
+        let is_unrun = |check: &Check| {
+            (&*check.subject, &*check.name) == ("serial", RUNS)
+                && matches!(check.outcome, Outcome::LeftOut { .. })
+        };
+        let lacks_a_run = cases.iter().any(|case| case.checks.iter().any(is_unrun));
         let of_definition = engine.promises.definition.then_some(false);
         let (ranks, parallel) = (options.ranks.is_some(), !engine.run.parallel.is_empty());
-        let of_ranks = engine.promises.is_independent_of(Independence::Ranks) && parallel;
+        let of_ranks = match parallel {
+            true => engine.promises.is_independent_of(Independence::Ranks),
+            // By the definition alone, a program without ranks promises nothing of them.
+            false => engine.promises.independent_of.contains(&Independence::Ranks),
+        };
         // Without `--require`, whether it is required; `None` if the engine has no use of it.
         let required = |need| match need {
-            Need::Mpi => (ranks || parallel).then_some(!options.no_mpi && (ranks || of_ranks)),
+            Need::Mpi => {
+                (ranks || parallel || of_ranks).then_some(!options.no_mpi && (ranks || of_ranks))
+            }
             Need::Oracles | Need::P4est | Need::Proof => of_definition,
             Need::Geometries => Some(false),
-            Need::Checks => Some(unchecked.len() == cases.len() || !options.cases.is_empty()),
+            Need::Checks => {
+                Some(unchecked.len() == cases.len() || lacks_a_run || !options.cases.is_empty())
+            }
         };
         let missing = absent.into_iter().filter_map(|(need, why)| {
             let required = if options.require.contains(&need) { true } else { required(need)? };

@@ -43,7 +43,9 @@ fn every_planted_wrong_report_is_refused() {
         for name in [identical::NAME, manifest::NAME] {
             case.checks.push(Check { name: name.into(), ..case.checks[1].clone() });
         }
-        case.checks.push(Check::new("serial", DETERMINISTIC, Outcome::held(7600)));
+        for name in [manifest::NAME, DETERMINISTIC] {
+            case.checks.push(Check::new("serial", name, Outcome::held(7600)));
+        }
         case.runs[1].digest = "1".repeat(32);
     };
     assert!(refusal(differs).contains("is not identical"));
@@ -85,7 +87,8 @@ fn drawn() -> impl Strategy<Value = Report> {
             let names = [RUNS, identical::NAME, manifest::NAME];
             let checks_of = |l| names.map(|name| of_layout(l, name, Outcome::held(cells)));
             let mut checks: Vec<_> = layouts.iter().flat_map(checks_of).collect();
-            checks.push(Check::new("serial", DETERMINISTIC, Outcome::held(cells)));
+            let of_serial = [manifest::NAME, DETERMINISTIC];
+            checks.extend(of_serial.map(|name| Check::new("serial", name, Outcome::held(cells))));
             checks.extend(
                 (0..failures).map(|_| Check::new("serial", "balance", Outcome::fail("one"))),
             );
