@@ -197,6 +197,7 @@ impl<'a> Problem<'a> {
     /// Makes the pilot runs and extrapolates them.
     fn plan(&self, run: Run) -> Result<Plan, Error> {
         let coarsest = self.rules.level_deepest();
+        let are_deepest = self.rules.boxes.iter().all(|b| b.level == coarsest);
         let [rough, rough_boxed] = self.rough;
         let rough_at = |s: Level| rough / 4f64.powi(s as i32) + rough_boxed / 8f64.powi(s as i32);
         // Without doubt that the run does not fit, its pilots are short.
@@ -215,7 +216,7 @@ impl<'a> Problem<'a> {
                 cells: amounts.cells as u64,
                 time_cpu_s: amounts.time_cpu_s(),
             });
-            let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed };
+            let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed, are_deepest };
             let next = shift - shift.min(1);
             // A pilot also makes the cells in boxes that it deletes.
             let cells = pilot.at(next).cells.max(rough_boxed / 8f64.powi(next as i32));

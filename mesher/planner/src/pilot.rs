@@ -6,7 +6,7 @@
 //! overlap, and with slower terms for the far field. Two pilot runs give the first term and one for all others, whose base lies
 //! between 2 and 1 for the slower ones.
 
-use bricks::brick::{self, Brick};
+use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::octant::{Level, corner, edge};
 use bytemuck::{Pod, Zeroable};
@@ -107,10 +107,15 @@ pub struct Pilot {
     pub coarser: Option<Amounts>,
     /// Cells in the boxes at the case's own spacing.
     pub cells_boxed: f64,
+    /// Whether no leaf is finer than any box.
+    pub are_deepest: bool,
 }
 
-/// Bytes per cell of a box, those of its bricks and their ancestors: while sides are decided, and more then if it is kept, and in gradation.
-const BYTES_PER_CELL_BOXED: [f64; 3] = [0.25, 0.11, 0.05];
+/// Bytes per cell of a box while sides are decided, if it is kept and if it is deleted: of boxes some of which are coarser than other leaves,
+/// and of those that are not. The set of a level with finer ones has full bricks.
+const BYTES_PER_CELL_BOXED: [[f64; 2]; 2] = [[0.38, 0.36], [0.19, 0.24]];
+/// The same in gradation, which makes no deleted ones.
+const BYTES_PER_CELL_GRADED: f64 = 0.05;
 /// A visit of each brick of 64 cells.
 const TESTS_PER_CELL_BOXED: f64 = 1.0 / (64.0 * VISITS_PER_TEST);
 
@@ -121,9 +126,8 @@ impl Pilot {
         if shift == self.shift {
             return fine;
         }
-        // Refinement and sides see those that are deleted, too.
-        let (all, kept) =
-            (self.cells_boxed, (self.cells_boxed - fine.cells_boxed_deleted).max(0.0));
+        let deleted = fine.cells_boxed_deleted.min(self.cells_boxed);
+        let kept = self.cells_boxed - deleted;
         let further = self.shift as i32 - shift as i32;
         // Extrapolates one quantity, of which the boxes have so much at the case's own spacing.
         let grown = |of: fn(&Amounts) -> f64, of_boxes: f64| {
@@ -133,13 +137,13 @@ impl Pilot {
             shell_at(further, shell(self.shift, &fine), coarse) + boxed(shift)
         };
         let cells = grown(|a| a.cells, kept);
-        let tests = grown(|a| a.tests, all * TESTS_PER_CELL_BOXED);
-        let [of_all, of_kept, graded] = BYTES_PER_CELL_BOXED;
+        let tests = grown(|a| a.tests, self.cells_boxed * TESTS_PER_CELL_BOXED);
+        let [of_kept, of_deleted] = BYTES_PER_CELL_BOXED[usize::from(self.are_deepest)];
         Amounts {
             cells,
             tests,
-            bytes_sides: grown(|a| a.bytes_sides, all * of_all + kept * of_kept),
-            bytes_graded: grown(|a| a.bytes_graded, kept * graded),
+            bytes_sides: grown(|a| a.bytes_sides, kept * of_kept + deleted * of_deleted),
+            bytes_graded: grown(|a| a.bytes_graded, kept * BYTES_PER_CELL_GRADED),
             time_refine_s: fine.time_refine_s * tests / fine.tests.max(1.0),
             time_cells_s: fine.time_cells_s * cells / fine.cells.max(1.0),
             ..fine
@@ -160,15 +164,10 @@ fn shell_at(further: i32, fine: f64, coarse: Option<f64>) -> f64 {
 /// Deepest level of the octants in which overlapping boxes are distinguished.
 const LEVEL_OVERLAP: Level = 6;
 
-/// The boxes that meet a cube.
-fn near(boxes: &[ExtentBox], min: [i64; 3], h: i64) -> Vec<ExtentBox> {
-    boxes.iter().filter(|b| b.meets(min, h)).copied().collect()
-}
-
 /// The cells that boxes ask for in an octant; where boxes overlap, the finest of them.
 pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
     let (min, h) = (corner(l, code), edge(l));
-    let near = near(boxes, min, h);
+    let near: Vec<ExtentBox> = boxes.iter().filter(|b| b.meets(min, h)).copied().collect();
     let finest = near.iter().map(|b| b.level).max();
     let fills = |b: &ExtentBox| (0..3).all(|a| b.min[a] <= min[a] && min[a] + h <= b.max[a]);
     let is_one = near.iter().any(|b| Some(b.level) == finest && fills(b));
@@ -188,10 +187,7 @@ fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
     let of_brick = |l: Level, b: Brick| match b.bits {
         // A full brick is one octant.
         u64::MAX => boxed_in(boxes, l - 2, b.key),
-        _ => {
-            let near = near(boxes, brick::min_corner(l, b.key), 4 * edge(l));
-            b.codes().map(|code| boxed_in(&near, l, code)).sum::<f64>()
-        }
+        _ => b.codes().map(|code| boxed_in(boxes, l, code)).sum::<f64>(),
     };
     let bricks_of = |l, deleted| mesh.ownership.owned(l, deleted).map(move |b| of_brick(l, b));
     (0..).zip(mesh.sides.deleted()).flat_map(|(l, deleted)| bricks_of(l, deleted)).sum()
@@ -211,7 +207,8 @@ mod tests {
             Amounts { cells, cells_boxed_deleted: 1e9, ..Amounts::default() }
         };
         let (shift, cells_boxed) = (4, 10e9);
-        let pilot = Pilot { shift, amounts: amounts(4), coarser: Some(amounts(5)), cells_boxed };
+        let (amounts_fine, coarser) = (amounts(4), Some(amounts(5)));
+        let pilot = Pilot { shift, amounts: amounts_fine, coarser, cells_boxed, are_deepest: true };
         for shift in 0..4 {
             let error = pilot.at(shift).cells / amounts(shift as i32).cells - 1.0;
             assert!(error.abs() < 1e-9, "{shift}: {error}");
@@ -229,19 +226,20 @@ mod tests {
         let tiny = [0.5, 0.0, 0.25, 40.0, 50.0, 1.0, 1.0, 1.0];
         #[rustfmt::skip]
         let expected = [
-            (2, fine, Some(coarse), 6e7, 0, [150128554.6875, 2000000.0, 1204223.14453125, 90279304.296875, 96146302.734375, 8.028154296875, 83.4047526041667, 7.0]),
+            (2, fine, Some(coarse), 6e7, 0, [150128554.6875, 2000000.0, 1204223.14453125, 83704666.015625, 96146302.734375, 8.028154296875, 83.4047526041667, 7.0]),
             (2, fine, Some(coarse), 6e7, 2, [9000000.0, 2000000.0, 300000.0, 8000000.0, 9000000.0, 2.0, 5.0, 7.0]),
             (2, fine, Some(coarse), 6e7, 3, [3000000.0, 2000000.0, 160944.758234797, 3200000.0, 3400000.0, 1.07296505489865, 1.66666666666667, 7.0]),
-            (2, fine, None, 6e7, 0, [187500000.0, 2000000.0, 4940625.0, 144035000.0, 146175000.0, 32.9375, 104.166666666667, 7.0]),
-            (3, fine, Some(odd), 1000000.0, 0, [56984625.0, 2000000.0, 1902573.85482788, 903225040.345459, 1020609760.0, 12.6838256988525, 31.658125, 7.0]),
+            (2, fine, None, 6e7, 0, [187500000.0, 2000000.0, 4940625.0, 136625000.0, 146175000.0, 32.9375, 104.166666666667, 7.0]),
+            (3, fine, Some(odd), 1000000.0, 0, [56984625.0, 2000000.0, 1902573.85482788, 903216774.931641, 1020609760.0, 12.6838256988525, 31.658125, 7.0]),
             (1, tiny, None, 0.0, 0, [2.0, 0.0, 1.0, 160.0, 200.0, 1.0, 2.0, 1.0]),
-            (1, coarse, Some(fine), 4000000.0, 4, [454313.98841289, 3000000.0, 31343.7423388245, 483756.673151377, 536012.049093912, 0.0783593558470612, 0.189297495172038, 6.0]),
-            (2, fine, Some(coarse), 6e9, 0, [6003576625.0, 2000000.0, 18801337.5, 2163582600.0, 314664878.90625, 125.34225, 3335.32034722222, 7.0]),
-            (2, fine, Some(coarse), 6e9, 3, [11864843.75, 2000000.0, 44729.2018581081, 4378320.3125, 2917667.86317568, 0.298194679054054, 6.59157986111111, 7.0]),
+            (1, coarse, Some(fine), 4000000.0, 4, [454313.98841289, 3000000.0, 31343.7423388245, 487656.278485402, 536012.049093912, 0.0783593558470612, 0.189297495172038, 6.0]),
+            (2, fine, Some(coarse), 6e9, 0, [6003576625.0, 2000000.0, 18801337.5, 1141469000.0, 314664878.90625, 125.34225, 3335.32034722222, 7.0]),
+            (2, fine, Some(coarse), 6e9, 3, [11864843.75, 2000000.0, 44729.2018581081, 2442974.02871622, 2917667.86317568, 0.298194679054054, 6.59157986111111, 7.0]),
         ];
         for (shift, fine, coarser, cells_boxed, at, expected) in expected {
             let coarser = coarser.map(amounts);
-            let pilot = Pilot { shift, amounts: amounts(fine), coarser, cells_boxed };
+            let amounts = amounts(fine);
+            let pilot = Pilot { shift, amounts, coarser, cells_boxed, are_deepest: true };
             let found: [f64; AMOUNTS] = bytemuck::cast(pilot.at(at));
             for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
                 let error = (found - expected).abs() / expected.abs().max(1.0);

@@ -72,6 +72,19 @@ fn the_finer_pilot_takes_a_moment_or_has_a_64th_of_the_cells() {
     assert_eq!(planned(ROUGH * 64.0, 1.0).1, [4, 3]);
 }
 
+/// Although few of their cells are kept.
+#[test]
+fn boxes_in_deleted_space_are_not_made_by_a_pilot() {
+    let mut asked = Vec::new();
+    let mut pilot = |shift| {
+        asked.push(shift);
+        Ok((amounts(ROUGH / 64.0, 1.0, shift), false))
+    };
+    with_problem(13, |problem| Problem { rough: [ROUGH, 64e12], ..*problem }.plan(&mut pilot))
+        .expect("the pilots succeed");
+    assert_eq!(asked, [9, 8]);
+}
+
 #[test]
 fn what_is_written_takes_time() {
     let time = |words, tree| {
@@ -205,7 +218,8 @@ fn two_pilot_runs_predict_the_mesh() {
     // These repeat exactly: a change of what is counted shows here.
     assert_eq!(counted(&mesh), [764868.0, 27894.96431997696, 22726.6, 214338.0, 194820.0]);
     assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
-    let pilot = Pilot { shift: 1, amounts: fine, coarser: Some(coarse), cells_boxed };
+    let (coarser, are_deepest) = (Some(coarse), true);
+    let pilot = Pilot { shift: 1, amounts: fine, coarser, cells_boxed, are_deepest };
     let predicted = pilot.at(0);
     for (name, predicted, measured) in [
         ("cells", predicted.cells, mesh.cells),
