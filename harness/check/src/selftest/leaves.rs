@@ -3,11 +3,10 @@
 
 use super::SelftestCase;
 use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, base, changed, merge, middle, sets, sibling_groups,
+    self, AUDITED, INFORMED, Mutant, base, changed, is_far, merge, middle, sets, sibling_groups,
     split_first, words,
 };
 use contract::manifest::Keep;
-use contract::neighbourhood::Neighbourhood;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::{HOLES, Tree};
 use contract::word::{self, Side};
@@ -67,11 +66,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         // Next to deleted crossing leaves, one more hole would be indistinguishable from them.
         let tree = Tree::of_words(&s.mesh.words);
         let near_surface = HOLES | 1 << Side::Crossing as u8;
-        let away = |w: u64| {
-            let around = Neighbourhood::of(&tree, word::octant(w));
-            word::level(w) < s.case.level_surface
-                && around.handles.iter().all(|&h| tree.kinds(h) & near_surface == 0)
-        };
+        let away = |w| word::level(w) < s.case.level_surface && is_far(&tree, w, near_surface);
         changed(s, away, |words, i| _ = words.remove(i))
     }),
     words("crossing leaf removed", "complete", INFORMED, |s| {

@@ -6,8 +6,10 @@ use std::path::Path;
 
 use super::SelftestCase;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tree as Kind};
+use contract::manifest::{Components, Manifest, Tree as Kind};
+use contract::neighbourhood::Neighbourhood;
 use contract::octant::CELLS_PER_EDGE;
+use contract::tree::{Kinds, Tree};
 use contract::word::{self, Side};
 
 /// A way to corrupt a correct mesh.
@@ -34,6 +36,8 @@ pub(super) enum Change {
     Words(Kind, fn(&SelftestCase) -> Option<Vec<u64>>),
     /// The manifest of the mesh.
     Manifest(fn(&mut Manifest)),
+    /// The components that the manifest counts, if it does.
+    Components(fn(&mut Components)),
     /// The files of the mesh.
     Files(fn(&Path) -> io::Result<()>),
     /// Anything.
@@ -70,6 +74,7 @@ impl Mutant {
                 edit(&mut made.mesh.manifest);
                 (made.mesh.manifest != correct.mesh.manifest).then_some(())?;
             }
+            Change::Components(edit) => edit(made.mesh.manifest.components.as_mut()?),
             Change::Files(tamper) => {
                 // Both parts have enough leaves for the damage to have an effect.
                 let are_enough = |part: &Vec<u64>| (2..1 << 20).contains(&part.len());
@@ -97,6 +102,7 @@ rows! {
     words: Words[Final](fn(&SelftestCase) -> Option<Vec<u64>>);
     base: Words[Base](fn(&SelftestCase) -> Option<Vec<u64>>);
     edit: Manifest(fn(&mut Manifest));
+    counts: Components(fn(&mut Components));
     damaged: Files(fn(&Path) -> io::Result<()>);
     sets: Sets(fn(&SelftestCase, &mut Mutation) -> Option<()>);
 }
@@ -135,6 +141,12 @@ pub(super) fn changed(
     let i = middle(&words, predicate)?;
     change(&mut words, i);
     Some(words)
+}
+
+/// Whether a leaf and its neighbours have none of these kinds.
+pub(super) fn is_far(tree: &Tree, word: u64, from: Kinds) -> bool {
+    let around = Neighbourhood::of(tree, word::octant(word));
+    around.handles.iter().all(|&handle| tree.kinds(handle) & from == 0)
 }
 
 /// The leaf with this side.

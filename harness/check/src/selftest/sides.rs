@@ -4,20 +4,17 @@
 //! larger mesh, too.
 
 use super::SelftestCase;
-use super::mutant::{AUDITED, INFORMED, Mutant, changed, edit, sets, with_side, words};
+use super::mutant::{
+    AUDITED, INFORMED, Mutant, changed, counts, edit, is_far, sets, with_side, words,
+};
 use crate::checks::components;
 use contract::manifest::Keep;
-use contract::neighbourhood::Neighbourhood;
 use contract::tree::Tree;
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
-    words("one outside leaf labelled inside", "sides", INFORMED, |s| {
-        relabelled(s, Side::Outside, Side::Inside)
-    }),
-    words("one inside leaf labelled outside", "sides", INFORMED, |s| {
-        relabelled(s, Side::Inside, Side::Outside)
-    }),
+    sides("one outside leaf labelled inside", |s| relabelled(s, Side::Outside, Side::Inside)),
+    sides("one inside leaf labelled outside", |s| relabelled(s, Side::Inside, Side::Outside)),
     words("one leaf of the side that is deleted", "sides", AUDITED, |s| match s.case.keep {
         Keep::Outside => relabelled(s, Side::Outside, Side::Inside),
         Keep::Inside => relabelled(s, Side::Inside, Side::Outside),
@@ -27,27 +24,15 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let tree = Tree::of_words(&s.mesh.words);
         let outside = 1 << Side::Outside as u8;
         // Leaves of the same component surround it.
-        let deep = |w: u64| {
-            let around = Neighbourhood::of(&tree, word::octant(w));
-            word::side(w) == Side::Outside
-                && around.handles.iter().all(|&h| tree.kinds(h) & !outside == 0)
-        };
+        let deep = |w| word::side(w) == Side::Outside && is_far(&tree, w, !outside);
         labelled(s, Side::Inside, deep).filter(|_| s.case.keep == Keep::All)
     }),
-    words("all inside leaves labelled outside", "sides", INFORMED, |s| {
-        flipped(s, |w| word::side(w) == Side::Inside)
-    }),
-    words("inside and outside swapped everywhere", "sides", INFORMED, |s| flipped(s, |_| true)),
-    words("crossing leaf labelled outside", "sides", INFORMED, |s| {
-        relabelled(s, Side::Crossing, Side::Outside)
-    }),
-    words("crossing leaf labelled inside", "sides", INFORMED, |s| {
-        relabelled(s, Side::Crossing, Side::Inside)
-    }),
-    words("leaf labelled crossing", "sides", INFORMED, |s| {
-        labelled(s, Side::Crossing, |w| !word::is_crossing(w))
-    }),
-    words("leaf of the surface's level labelled crossing", "sides", INFORMED, |s| {
+    sides("all inside leaves labelled outside", |s| flipped(s, |w| word::side(w) == Side::Inside)),
+    sides("inside and outside swapped everywhere", |s| flipped(s, |_| true)),
+    sides("crossing leaf labelled outside", |s| relabelled(s, Side::Crossing, Side::Outside)),
+    sides("crossing leaf labelled inside", |s| relabelled(s, Side::Crossing, Side::Inside)),
+    sides("leaf labelled crossing", |s| labelled(s, Side::Crossing, |w| !word::is_crossing(w))),
+    sides("leaf of the surface's level labelled crossing", |s| {
         let of_surface = |w| word::level(w) == s.case.level_surface;
         labelled(s, Side::Crossing, |w| !word::is_crossing(w) && of_surface(w))
     }),
@@ -69,22 +54,16 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let applies = s.case.keep != Keep::All && !s.case.seeds.is_empty();
         applies.then(|| removed(s, |_| true)).flatten()
     }),
-    words("side flipped against the seeds", "sides", INFORMED, |s| {
+    sides("side flipped against the seeds", |s| {
         let flow = s.case.side_of_flow();
         swapped(s, |w| word::side(w) == flow).filter(|_| !s.case.seeds.is_empty())
     }),
-    edit("manifest: one outside component too many", "kept", INFORMED, |m| {
-        m.components.iter_mut().for_each(|c| c.outside += 1);
+    counts("manifest: one outside component too many", "kept", INFORMED, |c| c.outside += 1),
+    counts("manifest: one inside component too many", "kept", INFORMED, |c| c.inside += 1),
+    counts("manifest: one enclosed component too many", "kept", INFORMED, |c| {
+        c.enclosed.count += 1
     }),
-    edit("manifest: one inside component too many", "kept", INFORMED, |m| {
-        m.components.iter_mut().for_each(|c| c.inside += 1);
-    }),
-    edit("manifest: one enclosed component too many", "kept", INFORMED, |m| {
-        m.components.iter_mut().for_each(|c| c.enclosed.count += 1);
-    }),
-    edit("manifest: one enclosed leaf too many", "kept", INFORMED, |m| {
-        m.components.iter_mut().for_each(|c| c.enclosed.leaves += 1);
-    }),
+    counts("manifest: one enclosed leaf too many", "kept", INFORMED, |c| c.enclosed.leaves += 1),
     sets("manifest: enclosed component in the mesh", "kept", AUDITED, |s, mutation| {
         let leaf = word::octant(*s.mesh.words.first()?);
         let components = mutation.mesh.manifest.components.as_mut()?;
@@ -95,6 +74,11 @@ pub(super) const MUTANTS: &[Mutant] = &[
         m.components.iter_mut().for_each(|c| c.enclosed.count = c.outside);
     }),
 ];
+
+/// Sides of which only the case shows that they are wrong.
+const fn sides(name: &'static str, change: fn(&SelftestCase) -> Option<Vec<u64>>) -> Mutant {
+    words(name, "sides", INFORMED, change)
+}
 
 /// The mesh with another side for one leaf of those that satisfy a predicate.
 fn labelled(s: &SelftestCase, to: Side, predicate: impl Fn(u64) -> bool) -> Option<Vec<u64>> {
