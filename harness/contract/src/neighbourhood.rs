@@ -48,7 +48,7 @@ impl Neighbourhood {
     /// The neighbourhood of the root.
     pub fn root(tree: &Tree) -> Self {
         let mut handles = [Handle::OUTSIDE_ROOT; 27];
-        handles[SELF] = tree.root();
+        handles[SELF] = tree.root;
         Self { octant: Octant::ROOT, handles }
     }
 

@@ -106,7 +106,8 @@ pub type Enter<'e> = &'e mut dyn FnMut(Octant, Handle) -> bool;
 /// `#[inline]`.
 #[derive(Debug, Default)]
 pub struct Tree {
-    root: Handle,
+    /// The content of the root.
+    pub root: Handle,
     /// The children of all nodes.
     children: Vec<[Handle; 8]>,
     summaries: Vec<Summary>,
@@ -121,11 +122,6 @@ impl Tree {
         let mut builder = Builder::default();
         words.iter().for_each(|&first| _ = builder.push_block(&Block { first, depth: 0 }));
         builder.finish()
-    }
-
-    /// The content of the root.
-    pub fn root(&self) -> Handle {
-        self.root
     }
 
     /// Number of distinct nodes.

@@ -35,7 +35,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let (nodes, split) = by_level(&tree);
     let shape = Shape { origin, edge, nodes };
     let children = split.iter().flat_map(|&node| tree.children(node));
-    let shown = children.chain([tree.root()]).filter(|content| content.as_leaf().is_some());
+    let shown = children.chain([tree.root]).filter(|content| content.as_leaf().is_some());
     assert_eq!(shown.count() as u64, leaves, "nodes that are neither split nor masked, and leaves");
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
@@ -46,7 +46,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
             uninterrupted()?;
             let mut window = Window::new(index);
             if index == 0 {
-                window.put_root(siblings(&[tree.root()]));
+                window.put_root(siblings(&[tree.root]));
             }
             for group in groups(index).take_while(|&group| group < split.len() as u64) {
                 window.put(group, siblings(&tree.children(split[group as usize])));
@@ -61,7 +61,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
 /// The numbers of nodes by level, and the split nodes as the file numbers them: the children of each are one group of siblings.
 fn by_level(tree: &Tree) -> (Vec<u64>, Vec<Handle>) {
     let is_split = |of: &Handle| of.is_node();
-    let mut level: Vec<Handle> = [tree.root()].into_iter().filter(is_split).collect();
+    let mut level: Vec<Handle> = [tree.root].into_iter().filter(is_split).collect();
     let (mut nodes, mut split) = (vec![1], Vec::new());
     while !level.is_empty() {
         nodes.push(8 * level.len() as u64);

@@ -45,7 +45,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
             has_coarse.then_some(!handle.is_node())
         };
         let boxes = [Boxes::new(self.tree, &requires), Boxes::new(self.tree, &is_coarse)];
-        self.below(&Trail::new(self.tree), (Octant::ROOT, self.tree.root()), &boxes, result);
+        self.below(&Trail::new(self.tree), (Octant::ROOT, self.tree.root), &boxes, result);
     }
 
     /// Checks an octant in the octant of the trail, which is the same or has at least the margin as edge.
@@ -180,7 +180,7 @@ pub fn check_gap(
             "{what}: {part} is refined beyond level {level}, but too near to the leaf {coarse}"
         ));
     };
-    for split in 0..tree.finest_level(tree.root(), 0) {
+    for split in 0..tree.finest_level(tree.root, 0) {
         let Some(margin) = margin(split) else { break };
         let requires = |handle: Handle, level: u8| {
             let has_split = level <= split && tree.finest_level(handle, level) > split;

@@ -60,7 +60,7 @@ fn compare(found: &Found, terms: &Manifest, result: &mut CheckResult) {
 
 /// Checks the boundaries of holes, from the leaves only.
 fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
-    if tree.root() == Handle::HOLE {
+    if tree.root == Handle::HOLE {
         // A body that fills the root leaves an empty mesh, unless nothing is ever deleted.
         if terms.keep == Keep::All && terms.keep_crossing {
             result.report("the mesh has no leaves, although nothing is deleted");

@@ -91,7 +91,7 @@ fn check_alone(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut 
         let (least, found) = match &found {
             Some(all) => (expected, all.iter().filter(|of| of.side == side).count() as u64),
             // Leaves show whether there is one.
-            None => (expected.min(1), (tree.kinds(tree.root()) >> side as u8 & 1).into()),
+            None => (expected.min(1), (tree.kinds(tree.root) >> side as u8 & 1).into()),
         };
         if found != least {
             result.report(format_args!(

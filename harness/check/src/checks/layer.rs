@@ -40,7 +40,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         check_layers(tree, terms, result);
     }
     check_surface_layer(tree, terms, result);
-    let has_extra = !terms.keep_crossing && tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
+    let has_extra = !terms.keep_crossing && tree.kinds(tree.root) & CROSSING_OR_DELETED != 0;
     let none = is_balance && !has_extra;
     let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
     let missing = some_leaves(subject.tree_with_deleted()).or_else(|| none.then(why));

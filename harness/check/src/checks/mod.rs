@@ -109,11 +109,11 @@ fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
 
 /// Why a check that compares leaves of several levels in this tree can find nothing.
 fn several_levels(tree: &Tree) -> Option<String> {
-    let level = tree.finest_level(tree.root(), 0);
-    let uniform = tree.coarsest_level(tree.root(), 0) >= level;
+    let level = tree.finest_level(tree.root, 0);
+    let uniform = tree.coarsest_level(tree.root, 0) >= level;
     some_leaves(tree).or_else(|| uniform.then(|| format!("all leaves have level {level}")))
 }
 
 fn some_leaves(tree: &Tree) -> Option<String> {
-    (tree.root() == Handle::HOLE).then(|| NO_LEAVES.to_owned())
+    (tree.root == Handle::HOLE).then(|| NO_LEAVES.to_owned())
 }

@@ -36,7 +36,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     not_kept(subject.tree(), terms, result);
     of_neighbours(subject.tree(), terms, result);
     let Some(truth) = subject.truth() else {
-        let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
+        let kinds = subject.tree().kinds(subject.tree().root) & !HOLES;
         let alike = || (kinds.count_ones() == 1).then(|| "all leaves have one side".to_owned());
         return result.requires(some_leaves(subject.tree_with_deleted()).or_else(alike));
     };

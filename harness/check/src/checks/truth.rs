@@ -102,12 +102,12 @@ impl Truth {
 
     /// Visits the parts of a mesh, in Morton order.
     pub fn compare(&self, mesh: &Tree, visit: &mut dyn FnMut(Found)) {
-        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
+        self.descend(mesh, [mesh.root, self.tree.root], Octant::ROOT, false, visit);
     }
 
     /// Visits every leaf and every hole of a mesh, in Morton order.
     pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Found)) {
-        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, true, visit);
+        self.descend(mesh, [mesh.root, self.tree.root], Octant::ROOT, true, visit);
     }
 
     fn descend(

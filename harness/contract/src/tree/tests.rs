@@ -70,7 +70,7 @@ fn a_deleted_leaf_bounds_no_level_from_above_and_is_a_kind() {
     let invalid = Block { first: 25 << 2, depth: 0 };
     assert_eq!(builder.push_block(&invalid), Err(word::check(25 << 2).unwrap_err()));
     let tree = builder.finish();
-    let root = tree.root();
+    let root = tree.root;
     assert_eq!(
         (tree.finest_level(root, 0), tree.coarsest_level(root, 0), tree.kinds(root)),
         (2, 1, 1 | 1 << DELETED)
@@ -100,8 +100,8 @@ fn equal_subtrees_are_stored_once() {
     let tree = Tree::of_words(&level_4);
     assert_eq!(level_4.len(), 4096);
     assert_eq!(tree.nodes(), 4);
-    assert_eq!(tree.finest_level(tree.root(), 0), 4);
-    assert_eq!(tree.coarsest_level(tree.root(), 0), 4);
+    assert_eq!(tree.finest_level(tree.root, 0), 4);
+    assert_eq!(tree.coarsest_level(tree.root, 0), 4);
 }
 
 /// Visits every leaf with its neighbourhood, in Morton order.
