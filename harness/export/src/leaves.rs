@@ -28,7 +28,8 @@ pub struct Leaves {
     words: Vec<u64>,
     /// How many cells are before each leaf.
     numbers: Vec<u32>,
-    cells: u32,
+    /// Number of cells.
+    pub count: u32,
 }
 
 /// Content of an octant.
@@ -75,19 +76,14 @@ impl Leaves {
 
     /// Leaves with these words.
     pub fn new(words: Vec<u64>) -> Self {
-        let mut cells = 0u32;
+        let mut count = 0u32;
         let number = |word: &u64| {
-            let number = cells;
-            cells = cells.checked_add(u32::from(word & 3 != CUT)).expect("fewer than 2^32 cells");
+            let number = count;
+            count = count.checked_add(u32::from(word & 3 != CUT)).expect("fewer than 2^32 cells");
             number
         };
         let numbers = words.iter().map(number).collect();
-        Self { words, numbers, cells }
-    }
-
-    /// Number of cells.
-    pub fn count(&self) -> u32 {
-        self.cells
+        Self { words, numbers, count }
     }
 
     /// The words of the cells.

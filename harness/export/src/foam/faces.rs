@@ -80,7 +80,7 @@ impl Faces {
         let pairs = || self.owner.iter().zip(&self.neighbour);
         assert!(pairs().all(|(a, b)| a < b), "a face belongs to the cell with the higher number");
         assert!(pairs().is_sorted_by(|a, b| a < b), "a face is not in upper-triangular order");
-        let cells = leaves.count();
+        let cells = leaves.count;
         let exist = self.owner.iter().chain(&self.neighbour).all(|&cell| cell < cells);
         assert!(exist, "a face of cell {cells} or beyond");
         let (mut used, mut sums) = (vec![false; points.all.len()], vec![0u64; cells as usize]);

@@ -20,7 +20,7 @@ impl Mesh {
     /// If a file cannot be written, or if the user interrupts.
     pub fn write(&self, manifest: &Manifest, is_wide: bool, dir: &Path) -> Result<()> {
         let faces = &self.faces;
-        let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
+        let (points, cells) = (self.points.all.len() as u64, self.leaves.count);
         let vertices = faces.vertices.corners.len() as u64;
         let (count, inner) = (faces.count(), faces.neighbour.len());
         let note = format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{inner}");

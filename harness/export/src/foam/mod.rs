@@ -74,7 +74,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     if of_mesh.leaves.cells().any(word::is_crossing) {
         notes.push(CROSSED.to_owned());
     }
-    Ok(Summary { leaves: of_mesh.leaves.count().into(), bytes, notes })
+    Ok(Summary { leaves: of_mesh.leaves.count.into(), bytes, notes })
 }
 
 /// A warning about exported cells that the geometry crosses.
@@ -92,19 +92,19 @@ fn read(export: &Export<'_>) -> Result<Mesh> {
         }
         true
     })?;
-    export.require_some(leaves.count().into())?;
+    export.require_some(leaves.count.into())?;
     Mesh::new(leaves, ranks, Patches::new(case, !export.is_of_all()), regions)
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then the first.
 fn regions(leaves: &Leaves) -> Result<(Vec<u32>, usize, u32)> {
     // Sets of cells, which are represented by their first cells.
-    let mut sets = Sets::new(leaves.count() as usize);
+    let mut sets = Sets::new(leaves.count as usize);
     leaves.walk(&mut |cell, _, squares| {
         let high = squares.iter().filter(|square| square.is_high);
         high.filter_map(|square| square.across.as_cell()).for_each(|to| sets.union(cell, to));
     })?;
-    let of_cell: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
+    let of_cell: Vec<u32> = (0..leaves.count).map(|cell| sets.root(cell)).collect();
     let mut volumes = vec![0; of_cell.len()];
     for (&set, word) in of_cell.iter().zip(leaves.cells()) {
         volumes[set as usize] += word::span(word::level(word));

@@ -321,7 +321,7 @@ proptest! {
         let holes = words.iter().copied().filter(|&w| contract::digest::mix(w) % 5 < u128::from(one_in));
         let words: Vec<u64> = holes.collect();
         let leaves = leaves_of(&words, is_cut);
-        let cells = leaves.count() as usize;
+        let cells = leaves.count as usize;
         let (mut sets, mut volumes): (Vec<usize>, _) = ((0..cells).collect(), vec![0; cells]);
         leaves.visit_all(|cell, octant, squares| {
             volumes[cell as usize] = word::span(octant.level);
@@ -341,6 +341,6 @@ proptest! {
         prop_assert_eq!(mesh.regions, expected.len());
         // Its cells keep their ranks.
         let ranks: Vec<u32> = kept.iter().map(|&cell| cell as u32 % 7).collect();
-        prop_assert_eq!((mesh.leaves.count() as usize, mesh.ranks.unwrap()), (kept.len(), ranks));
+        prop_assert_eq!((mesh.leaves.count as usize, mesh.ranks.unwrap()), (kept.len(), ranks));
     }
 }
