@@ -99,11 +99,10 @@ impl Forest {
 
     /// Whether the mesh is an oct-tree in one root.
     pub fn is_one_cube(&self) -> bool {
-        let Connectivity { dimension, trees, tree_to_tree, tree_to_face, edges, corners, .. } =
-            &self.connectivity;
-        let is_boundary = (0..).zip(tree_to_face).all(|(face, &to)| face == to);
-        let is_alone = edges.trees.is_empty() && corners.trees.is_empty() && is_boundary;
-        (*dimension, tree_to_tree.as_slice()) == (3, &[0; 6]) && *trees == 1 && is_alone
+        let of = &self.connectivity;
+        let is_boundary = (0..).zip(&of.tree_to_face).all(|(face, &to)| face == to);
+        let is_alone = of.edges.trees.is_empty() && of.corners.trees.is_empty() && is_boundary;
+        of.dimension == 3 && of.trees == 1 && of.tree_to_tree == [0; 6] && is_alone
     }
 }
 
@@ -186,13 +185,13 @@ impl<'a> Input<'a> {
         Ok(self.numbers(N as u64, 1)?.try_into().expect("as many numbers as were read"))
     }
 
-    /// The lists of `count` edges or corners, but for `of_tree`.
-    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists> {
+    /// The lists of `count` edges or corners, given which one each place of a tree has.
+    fn lists(&mut self, of_tree: Vec<i32>, count: u64, pairs: u64) -> Result<Lists> {
         let offsets = self.numbers(count.saturating_add(1), 1)?;
         let why = "it states trees at edges or corners, and none where trees meet";
         Failure::unless(count > 0 || pairs == 0, damaged(why))?;
         let (trees, places) = (self.numbers(pairs, 1)?, self.numbers(pairs, 1)?);
-        Ok(Lists { of_tree: Vec::new(), offsets, trees, places })
+        Ok(Lists { of_tree, offsets, trees, places })
     }
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
@@ -223,22 +222,21 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64)> {
     let tree_to_edge = input.numbers(if_any(edges), 12)?;
     let tree_to_vertex = input.numbers(if_any(vertices), children)?;
     let tree_to_corner = input.numbers(if_any(corners), children)?;
-    let tree_to_tree = input.numbers(trees, faces)?;
-    let tree_to_face = input.numbers(trees, faces)?;
-    let attributes = input.items(trees, attribute_bytes)?.to_vec();
-    // p4est writes no offsets of edges in two dimensions.
-    let by_edge = if dimension == 3 { input.lists(edges, edge_trees)? } else { Lists::default() };
-    let corner_lists = input.lists(corners, corner_trees)?;
+    // Fields are read in this order, which is that of the file.
     let connectivity = Connectivity {
         dimension,
         trees: trees as usize,
         vertices: coordinates,
         tree_to_vertex,
-        tree_to_tree,
-        tree_to_face,
-        edges: Lists { of_tree: tree_to_edge, ..by_edge },
-        corners: Lists { of_tree: tree_to_corner, ..corner_lists },
-        attributes,
+        tree_to_tree: input.numbers(trees, faces)?,
+        tree_to_face: input.numbers(trees, faces)?,
+        attributes: input.items(trees, attribute_bytes)?.to_vec(),
+        edges: match dimension {
+            // p4est writes no offsets of edges in two dimensions.
+            2 => Lists { of_tree: tree_to_edge, ..Lists::default() },
+            _ => input.lists(tree_to_edge, edges, edge_trees)?,
+        },
+        corners: input.lists(tree_to_corner, corners, corner_trees)?,
     };
     Ok((connectivity, format))
 }
