@@ -128,12 +128,10 @@ impl Mesh {
     pub fn visit(&self, visit: Visit<'_>) -> Result<()> {
         let (mut order, mut visited) = (Order::default(), Ok(()));
         self.stream(&mut |part, blocks| {
-            let linear =
-                blocks.iter().try_for_each(|block| order.add(block.first)).map_err(|why| {
-                    let why =
-                        format!("not a linear oct-tree, because {why}: run harness audit on it");
-                    Failure::about(&self.dir, why)
-                });
+            let text =
+                |why| format!("not a linear oct-tree, because {why}: run harness audit on it");
+            let linear = blocks.iter().try_for_each(|block| order.add(block.first)).map_err(text);
+            let linear = linear.map_err(|why| Failure::about(&self.dir, why));
             visited = linear.and_then(|()| visit(part, blocks));
             visited.is_ok()
         })?;
