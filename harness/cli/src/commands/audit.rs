@@ -81,19 +81,16 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         return Err(Failure::missing(why));
     }
     let mut report = audit_against(directory, case.as_ref(), promises);
-    let checker = &paths.proven_checker;
-    let proof = |base: &Input| proven(checker, (directory, base), report.leaves, LIMIT);
-    let proof = proved.as_ref().map(proof).transpose();
     let mut code_of_proof = EXIT_HOLDS;
-    match proof {
-        Ok(proof) => report.checks.extend(proof),
-        Err(failure) => {
+    if let Some(base) = proved {
+        let proof = proven(&paths.proven_checker, (directory, base), report.leaves, LIMIT);
+        report.checks.push(proof.unwrap_or_else(|failure| {
             let Failure { code, why } = failure.into();
             code_of_proof = code;
             let mut left_out = CheckResult::new("proof");
             left_out.lacks(why);
-            report.checks.push(left_out);
-        }
+            left_out
+        }));
     }
     let code = publish(&report, arguments, code_of_proof)?;
     let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
