@@ -31,7 +31,7 @@ pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample
     let count = candidates.clone().count();
     // No facet meets the closed octant of a leaf that is not crossing, so its centroid is at least half an edge
     // away from the surface.
-    let clear = |leaf: &u64| case.root.edge / f64::from(1u32 << word::level(*leaf)) / 2.0 >= band;
+    let clear = |leaf: &u64| case.root.edge_of(word::level(*leaf)) / 2.0 >= band;
     let mut words: Vec<u64> = candidates.filter(clear).collect();
     let in_band = count - words.len();
     if words.len() > points_max {

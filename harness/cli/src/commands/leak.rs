@@ -57,8 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
             plain.table.remove("seeds");
         }
-        let spacing = case.root.edge / f64::from(1u32 << level);
-        plain.table.insert("spacing_min".into(), spacing.into());
+        plain.table.insert("spacing_min".into(), case.root.edge_of(level).into());
         let file = plain.write(place.path())?;
         let mesh = mesher.mesh(&file, &SERIAL, true, (place.path(), arguments.timeout))?;
         let tree = mesher.read_mesh(&mesh)?;
