@@ -49,8 +49,6 @@ pub struct Survey<'a> {
 /// The band of `complete` for an engine that promises no sides, in cells of the surface level.
 const BAND_CELLS: f64 = 1.0;
 
-type Visit<'v> = &'v mut dyn FnMut(Octant, Option<Kind>, Position);
-
 impl<'a> Survey<'a> {
     /// Runs a check of a subject, if its geometry is known.
     pub fn of(subject: &'a Subject, result: &mut CheckResult, check: fn(&Self, &mut CheckResult)) {
@@ -135,7 +133,7 @@ impl<'a> Survey<'a> {
 
     /// Visits every leaf, and every hole in the largest octants that have one position. Holes near the geometry are
     /// divided down to the level of the surface.
-    fn visit(&self, visit: Visit) {
+    fn visit(&self, visit: &mut dyn FnMut(Octant, Option<Kind>, Position)) {
         let surface = self.terms.level_surface;
         self.truth.facets.walk(self.band(), &mut |octant, near| {
             let handle = self.tree.at(&octant);

@@ -288,10 +288,9 @@ fn check_lists(
                 -1 => "no list".to_owned(),
                 list => format!("list {list}"),
             });
+            let (place, tree) = (at % places, at / places);
             result.report(format!(
-                "{what} {} of tree {} states {stated} of {what}s, but {found} has it",
-                at % places,
-                at / places
+                "{what} {place} of tree {tree} states {stated} of {what}s, but {found} has it"
             ));
         }
     }

@@ -74,11 +74,10 @@ impl Ballot<'_> {
         }
         let sentence = |subject: &str, against: &[usize]| {
             let first = *against.first()?;
+            let (count, place) = (against.len(), places[first]);
             let side = if self.mesh[first] { "inside" } else { "outside" };
             Some(format!(
-                "{subject} contradict the mesh at {} points, first at {:?}, which is {side} in the mesh",
-                against.len(),
-                places[first]
+                "{subject} contradict the mesh at {count} points, first at {place:?}, which is {side} in the mesh"
             ))
         };
         let exact = sentence("all six exact rays", &self.exact_against());

@@ -115,12 +115,9 @@ impl fmt::Display for SelftestReport {
         let unused = self.unused();
         unused.iter().try_for_each(|name| writeln!(f, "applies to no case: {name}"))?;
         let corruptions = catalogue().len() - unused.len();
-        let (trials, alarms) = (self.kills.len(), self.alarms.len());
-        write!(
-            f,
-            "{corruptions} corruptions in {trials} trials: {} survived, {alarms} false alarms",
-            survivors.len()
-        )
+        let (survived, alarms) = (survivors.len(), self.alarms.len());
+        write!(f, "{corruptions} corruptions in {} trials: ", self.kills.len())?;
+        write!(f, "{survived} survived, {alarms} false alarms")
     }
 }
 
