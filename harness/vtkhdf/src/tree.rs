@@ -141,13 +141,12 @@ impl Window {
     /// The compressed chunks.
     pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Chunks {
         let ([split, deleted], [of_split, of_deleted, of_sides]) = (&self.bits, lengths(shape));
-        // Arrays shorter than a window have one shorter chunk.
-        [(split, of_split, 1), (deleted, of_deleted, 1), (&self.sides, of_sides, 8)].map(
-            |(bytes, length, per_byte)| {
-                let bytes = &bytes[per_byte * MARGIN..bytes.len() - per_byte * MARGIN];
-                deflater.compress(&bytes[..bytes.len().min(length as usize)])
-            },
-        )
+        let all = [(split, of_split, 1), (deleted, of_deleted, 1), (&self.sides, of_sides, 8)];
+        all.map(|(bytes, length, per_byte)| {
+            let bytes = &bytes[per_byte * MARGIN..bytes.len() - per_byte * MARGIN];
+            // Arrays shorter than a window have one shorter chunk.
+            deflater.compress(&bytes[..bytes.len().min(length as usize)])
+        })
     }
 }
 

@@ -168,9 +168,8 @@ fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<
     let point = |index: u32| to_user(&points.all[index as usize], root).map(|c| c as f32);
     let finest = faces.iter().map(|face| root.edge_of(face.square.level)).fold(f64::MAX, f64::min);
     let is_moved = |c: &f64| (c - f64::from(*c as f32)).abs() > finest / 100.0;
-    if let Some(at) =
-        points.all.iter().map(|at| to_user(at, root)).find(|at| at.iter().any(is_moved))
-    {
+    let mut places = points.all.iter().map(|at| to_user(at, root));
+    if let Some(at) = places.find(|at| at.iter().any(is_moved)) {
         let why = format!(
             "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
              origin, or write a .vtp file"
