@@ -210,17 +210,11 @@ impl Trail<'_> {
     }
 
     /// The smallest neighbourhood that contains everything within this distance of the current octant.
-    fn wide(&self, margin: i64) -> &Self {
+    pub fn wide(&self, margin: i64) -> &Self {
         match self.above {
             Some(above) if i64::from(self.around.octant.edge()) < margin => above.wide(margin),
             _ => self,
         }
-    }
-
-    /// Whether a predicate of content and level holds for octants that contain everything within `margin` of the current octant.
-    pub fn all_nearby(&self, margin: i64, predicate: impl Fn(Handle, u8) -> bool) -> bool {
-        let wide = &self.wide(margin).around;
-        wide.handles.iter().all(|&handle| predicate(handle, wide.octant.level))
     }
 }
 

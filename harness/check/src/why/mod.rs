@@ -20,7 +20,7 @@ use contract::case::Case;
 use contract::failure::{Failure, Result};
 use contract::manifest::{self, Geometry, Manifest};
 use contract::octant::Octant;
-use contract::tree::{HOLES, Tree};
+use contract::tree::{HOLES, Handle, Tree};
 use rustc_hash::FxHashMap;
 
 use crate::checks::clearance::Trail;
@@ -107,11 +107,11 @@ impl<'a> Mesh<'a> {
     /// Whether nothing within the reach of a layer or the balance can force the current leaf to split. True for most leaves, and quick.
     fn has_nothing_finer(&self, trail: &Trail) -> bool {
         let level = trail.around.octant.level;
-        let is_coarse = |handle, at| {
+        let wide = &trail.wide(self.layer_reach(level + 1).max(1)).around;
+        let is_coarse = |&handle: &Handle| {
             let may_cross = self.has_deleted_crossing() && self.tree.kinds(handle) & HOLES != 0;
-            self.tree.finest_level(handle, at) <= level && !may_cross
+            self.tree.finest_level(handle, wide.octant.level) <= level && !may_cross
         };
-        level >= self.level_deepest
-            || trail.all_nearby(self.layer_reach(level + 1).max(1), is_coarse)
+        level >= self.level_deepest || wide.handles.iter().all(is_coarse)
     }
 }
