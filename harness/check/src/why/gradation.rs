@@ -85,12 +85,10 @@ impl Mesh<'_> {
     fn rule_of(&self, leaf: &Octant, octant: &Octant) -> Option<Rule> {
         let (from, distance) = (leaf.parent(), octant.distance(leaf));
         if distance < self.layer_reach(leaf.level) && self.is_deep(&from) {
-            Some(Rule::Layer)
-        } else if leaf.level > octant.level + 1 && distance == 0 && self.is_justified(&from) {
-            Some(Rule::Balance)
-        } else {
-            None
+            return Some(Rule::Layer);
         }
+        let may_balance = leaf.level > octant.level + 1 && distance == 0;
+        (may_balance && self.is_justified(&from)).then_some(Rule::Balance)
     }
 
     /// The first leaf of these levels outside an octant that forces it to split, with the rule. The order is fixed.
