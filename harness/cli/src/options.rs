@@ -124,10 +124,8 @@ impl SelectionArguments {
         let plane = |(axis, at)| {
             let (name, low) = (AXES[axis], root.origin[axis]);
             let high = low + root.edge;
-            let outside = || {
-                format!("--slice {name}={at}: the mesh extends from {name}={low} to {name}={high}")
-            };
-            Slice::new(root, axis, at).ok_or_else(outside)
+            let extent = format!("the mesh extends from {name}={low} to {name}={high}");
+            Slice::new(root, axis, at).ok_or_else(|| format!("--slice {name}={at}: {extent}"))
         };
         let clip = clip.map(|corners| corners.map(|corner| root.quantise_clamped(corner)));
         Ok(Selection { clip, level_max, side, rank, slice: slice.map(plane).transpose()? })

@@ -153,13 +153,12 @@ impl Case {
         let of_root = Value::try_from(root).expect("a root is representable in TOML");
         table.insert("root".into(), of_root);
         let case = Self { name, solids: Vec::new(), facets, facets_lattice, seeds, rules, table };
-        for (i, (&seed, at)) in case.rules.seeds.iter().zip(&case.seeds).enumerate() {
+        for (i, (&seed, &at)) in case.rules.seeds.iter().zip(&case.seeds).enumerate() {
             if let (leaf, Some(facet)) = case.base_leaf_at(seed, &case.facets_lattice) {
-                let leaf = root.place(leaf);
+                let (at, leaf) = (point(at), root.place(leaf));
                 return Err(Failure::input(format_args!(
-                    "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
-                     from the surface",
-                    point(*at)
+                    "seed {i} at {at} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
+                     from the surface"
                 )));
             }
         }

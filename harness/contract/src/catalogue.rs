@@ -146,9 +146,8 @@ fn missing_geometry(case: &Path) -> Option<String> {
     let table = files::read_text(case).ok()?.parse::<toml::Table>().ok()?;
     let geometry = table.get("geometry")?.as_str()?;
     let exists = case.parent()?.join(geometry).exists();
-    (!exists).then(|| {
-        format!("{geometry} is missing; ci/setup --geometries fetches it if it can be fetched")
-    })
+    let why = "is missing; ci/setup --geometries fetches it if it can be fetched";
+    (!exists).then(|| format!("{geometry} {why}"))
 }
 
 #[cfg(test)]

@@ -51,9 +51,8 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>> {
         name.starts_with("leaves-") && name.as_bytes()[7..12].iter().all(u8::is_ascii_digit)
     };
     let is_beyond = |name: &String| name.len() == last.len() && *name > last && is_number(name);
-    let why =
-        Failure::about(dir, format!("a part is missing: the last of {} is {last}", names.len()));
-    Failure::unless(!names.iter().any(is_beyond), why)?;
+    let why = format!("a part is missing: the last of {} is {last}", names.len());
+    Failure::unless(!names.iter().any(is_beyond), Failure::about(dir, why))?;
     let read = |name: String| {
         let path = dir.join(&name);
         Ok((name, PartFile::open(&path).map_err(|why| why.of_file(&path))?.read_all()?))

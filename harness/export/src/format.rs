@@ -82,11 +82,8 @@ pub fn of(path: &Path) -> Result<&'static Format> {
     };
     FORMATS.iter().find(fits).ok_or_else(|| {
         let endings: Vec<_> = FORMATS.iter().map(|format| format.ending).collect();
-        Failure::input(format!(
-            "{}: no format has such a name: choose one that ends in {}",
-            path.display(),
-            endings.join(", ")
-        ))
+        let why = "no format has such a name: choose one that ends in";
+        Failure::about(path, format_args!("{why} {}", endings.join(", ")))
     })
 }
 

@@ -96,11 +96,8 @@ impl fmt::Display for AuditReport {
         let Self { leaves, nodes, time_read_s, time_wall_s, .. } = self;
         let rate = *leaves as f64 / time_wall_s.max(1e-9) / 1e6;
         let nodes = if *nodes > 0 { format!(" ({nodes} distinct octants)") } else { String::new() };
-        write!(
-            f,
-            "{leaves} leaves{nodes} in {time_wall_s:.2} s, of which reading \
-             {time_read_s:.2} s: {rate:.1} M leaves/s"
-        )
+        write!(f, "{leaves} leaves{nodes} in {time_wall_s:.2} s, of which reading ")?;
+        write!(f, "{time_read_s:.2} s: {rate:.1} M leaves/s")
     }
 }
 

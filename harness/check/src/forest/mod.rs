@@ -68,14 +68,13 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
         for (index, quadrant) in quadrants.iter().enumerate() {
             let name = || named(tree, index, quadrant);
             let Some(leaf) = leaf(dimension, length, quadrant) else {
-                let name = name();
-                valid
-                    .report(format_args!("{name} is no octant of a tree whose length is {length}"));
+                let why = format_args!("is no octant of a tree whose length is {length}");
+                valid.report(format_args!("{} {why}", name()));
                 continue;
             };
             if leaf.key < next {
-                linear
-                    .report(format_args!("{} begins before the end of the one before it", name()));
+                let why = "begins before the end of the one before it";
+                linear.report(format_args!("{} {why}", name()));
             } else if leaf.key > next {
                 let why = "does not begin where the one before it ends, or the tree begins";
                 complete.report(format_args!("{} {why}", name()));
