@@ -121,15 +121,13 @@ impl CaseRun<'_> {
         }
         let serial = self.make("serial", "serial", MESHER, Tree::Final)?;
         self.verify_repetition(&timed, &serial.mesh);
-        let base = match self.promises().definition {
-            true => Some(self.verify_definition(case, &serial.mesh)?),
-            false => {
-                self.step("checks");
-                self.add_results("serial", None, self.promised(case, &serial.mesh));
-                None
-            }
-        };
-        Some((serial, base))
+        if self.promises().definition {
+            let base = self.verify_definition(case, &serial.mesh)?;
+            return Some((serial, Some(base)));
+        }
+        self.step("checks");
+        self.add_results("serial", None, self.promised(case, &serial.mesh));
+        Some((serial, None))
     }
 
     /// Compares a mesh with its base tree, which is returned, and with the reference.
