@@ -51,15 +51,13 @@ fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Fa
 
 /// The failure of a script, in which a missing package is called so.
 fn explained(failure: Failure) -> Failure {
-    match failure.end {
-        End::Exited { code, error }
-            if code == CODE_MISSING || error.contains("ModuleNotFoundError") =>
-        {
-            let why = format!("needs a package of Python that is missing: {error}");
-            Failure::new(failure.program, End::Missing(why))
-        }
-        _ => failure,
+    if let End::Exited { code, error } = &failure.end
+        && (*code == CODE_MISSING || error.contains("ModuleNotFoundError"))
+    {
+        let why = format!("needs a package of Python that is missing: {error}");
+        return Failure::new(failure.program, End::Missing(why));
     }
+    failure
 }
 
 /// The oracles, in the order in which they run.
