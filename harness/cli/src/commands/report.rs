@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     for main in &arguments.check {
         let mut all = 0;
         let (texts, is_outdated) = texts(main, &arguments.directory)?;
-        code = if is_outdated { EXIT_FAILED } else { code };
+        let mut has_failed = is_outdated;
         for (path, text) in texts {
             let shown = path.display();
             let Checked { compared, by_hand, findings } = check(&text, &numbers);
@@ -44,11 +44,10 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             println!(
                 "{shown}: {compared} numbers compared, {by_hand} of them by hand, with any result; {number} findings"
             );
-            if number > 0 {
-                code = EXIT_FAILED;
-            }
+            has_failed |= number > 0;
             all += compared;
         }
+        code = if has_failed { EXIT_FAILED } else { code };
         if all == 0 {
             let why = "has no number that the record could have, so nothing was compared";
             eprintln!("harness: {} {why}", main.display());
