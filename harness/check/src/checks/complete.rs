@@ -33,9 +33,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             result.examined = subject.examined_with(truth);
             truth.compare(tree, &mut |found| compare(&found, terms, result));
         }
-        None if terms.sides == Sides::Unknown && deletes => {
-            return result.lacks(UNKNOWN_SIDES);
-        }
+        None if terms.sides == Sides::Unknown && deletes => return result.lacks(UNKNOWN_SIDES),
         None => check_holes(tree, terms, result),
     }
     if subject.case.is_none() {

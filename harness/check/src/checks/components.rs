@@ -100,8 +100,7 @@ pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
         let free = coarse_neighbours(words, &octant).filter(|&j| !word::is_crossing(words[j]));
         free.for_each(|j| sets.union(i, j as u32));
     }
-    let mut members: Vec<(u32, u8, u32)> =
-        free().map(|(i, &w)| (sets.root(i), word::level(w), i)).collect();
+    let mut members = Vec::from_iter(free().map(|(i, &w)| (sets.root(i), word::level(w), i)));
     members.sort_unstable();
     let groups = members.chunk_by(|a, b| a.0 == b.0);
     groups.map(|group| group.iter().map(|&(_, _, i)| i).collect()).collect()

@@ -106,9 +106,7 @@ fn leaks(subject: &Subject, truth: &Truth) -> Vec<Leak> {
 fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
     let mut cut = Manifest { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
-    let make = |terms: &Manifest| {
-        Truth::of(case, terms).expect("T0 that is cut has no more leaves than T0")
-    };
+    let make = |terms: &Manifest| Truth::of(case, terms).expect("cut, T0 has no more leaves");
     let mut coarse = make(&cut);
     let seeded = components::seeded_leaves(&coarse.words, terms);
     if seeded.keys().any(|&leaf| word::is_crossing(coarse.words[leaf as usize])) {

@@ -134,9 +134,8 @@ pub fn read(path: &Path) -> Result<Forest> {
     let (dimension, mut begin) = (forest.connectivity.dimension, 0);
     let own_bytes = 4 * (dimension + 1);
     for end in ends {
-        let count = end
-            .checked_sub(begin)
-            .ok_or_else(|| damaged("the trees' numbers of quadrants decrease"))?;
+        let decrease = || damaged("the trees' numbers of quadrants decrease");
+        let count = end.checked_sub(begin).ok_or_else(decrease)?;
         let stride = own_bytes as u64 + data_bytes;
         let records = input.items(count, stride)?.chunks_exact(stride as usize);
         let quadrant = |record: &[u8]| {

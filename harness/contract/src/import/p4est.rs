@@ -79,9 +79,8 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells> {
     }
     let vertex = |&index: &i32| vertices.get(usize::try_from(index).ok()?);
     for (tree, indices) in tree_to_vertex.chunks_exact(8).enumerate() {
-        let corners: Option<Vec<_>> = indices.iter().map(vertex).collect();
-        let corners = corners
-            .ok_or_else(|| damaged(&format!("tree {tree} has a vertex that does not exist")))?;
+        let missing = || damaged(&format!("tree {tree} has a vertex that does not exist"));
+        let corners = indices.iter().map(vertex).collect::<Option<Vec<_>>>().ok_or_else(missing)?;
         let (origin, edge) = (*corners[0], corners[1][0] - corners[0][0]);
         let in_place = |(digit, corner): (usize, &&[f64; 3])| {
             (0..3).all(|a| {

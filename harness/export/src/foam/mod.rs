@@ -61,10 +61,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     // Every point is a vertex of a face.
     let is_wide = i32::try_from(of_mesh.faces.vertices.corners.len()).is_err();
     of_mesh.write(&export.mesh.manifest, is_wide, &dir).map_err(|failure| failure.of_file(path))?;
-    let mut bytes = 0;
-    for file in fs::read_dir(&dir).map_err(named)? {
-        bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
-    }
+    let sizes = fs::read_dir(&dir).map_err(named)?.map(|file| Ok(file?.metadata()?.len()));
+    let bytes = sizes.sum::<std::io::Result<u64>>().map_err(named)?;
     uninterrupted()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));

@@ -216,10 +216,9 @@ impl Front {
         let mut sum = [0i64; 3];
         for (face, corners) in self.faces.iter().zip(self.polygons.iter()) {
             let area = self.points.area(corners);
-            let edge = edge_of(face.square.level);
+            let twice = 2 * edge_of(face.square.level).pow(2);
             let mut expected = [0; 3];
-            expected[face.square.axis] =
-                if face.square.is_high { -2 * edge * edge } else { 2 * edge * edge };
+            expected[face.square.axis] = if face.square.is_high { -twice } else { twice };
             assert_eq!(area, expected, "twice the area of {face:?}");
             (0..3).for_each(|a| sum[a] += area[a]);
         }

@@ -89,9 +89,8 @@ impl Encoder {
         self.connectivity.clear();
         for Leaf { octant, .. } in &self.leaves {
             let (low, edge) = (octant.corner, octant.edge());
-            let number =
-                |corner: [u32; 3]| self.points.add([0, 1, 2].map(|a| low[a] + edge * corner[a]));
-            self.connectivity.extend(CORNERS.map(number));
+            let corners = CORNERS.map(|corner| [0, 1, 2].map(|a| low[a] + edge * corner[a]));
+            self.connectivity.extend(corners.map(|corner| self.points.add(corner)));
         }
     }
 
