@@ -99,28 +99,23 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
             data: Attributes { point: Vec::new(), cell },
             ..PolyDataPiece::default()
         };
-        Ok(write_xml(piece, out)?)
+        let file = Vtk {
+            version: Version { major: 1, minor: 0 },
+            title: "front towards the body".into(),
+            byte_order: ByteOrder::LittleEndian,
+            data: DataSet::inline(piece),
+            file_path: None,
+        };
+        // The errors of vtkio do not say what the system said.
+        let mut bytes = Vec::new();
+        file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
+        Ok(out.write_all(&bytes)?)
     })
 }
 
 /// One value for each point or cell.
 fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
     Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
-}
-
-/// Writes the polygons in VTK's format of XML.
-fn write_xml(piece: PolyDataPiece, out: &mut dyn Write) -> io::Result<()> {
-    let file = Vtk {
-        version: Version { major: 1, minor: 0 },
-        title: "front towards the body".into(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(piece),
-        file_path: None,
-    };
-    // The errors of vtkio do not say what the system said.
-    let mut bytes = Vec::new();
-    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
-    out.write_all(&bytes)
 }
 
 /// Writes the polygons as triangles. Coordinates have single precision.
