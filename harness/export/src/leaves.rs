@@ -103,10 +103,8 @@ impl Leaves {
     fn content(&self, begin: usize, end: usize, level: u8) -> Content {
         match self.words[begin..end] {
             [] => Content::Hole,
-            [one] if word::level(one) <= level => match one & 3 {
-                CUT => Content::Cut,
-                _ => Content::Cell(self.numbers[begin]),
-            },
+            [one] if word::level(one) <= level && one & 3 == CUT => Content::Cut,
+            [one] if word::level(one) <= level => Content::Cell(self.numbers[begin]),
             _ => Content::Split(begin, end),
         }
     }

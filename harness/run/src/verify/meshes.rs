@@ -101,10 +101,8 @@ impl CaseRun<'_> {
     }
 
     fn program(&self, program: &str) -> &Engine {
-        match program {
-            REFERENCE => &self.all.programs.reference,
-            _ => &self.all.programs.engine,
-        }
+        let programs = self.all.programs;
+        if program == REFERENCE { &programs.reference } else { &programs.engine }
     }
 
     /// Makes the serial mesh, which later steps use, and checks it; of an engine that promises the definition, also its base tree. `None`
