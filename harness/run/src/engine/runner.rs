@@ -165,14 +165,12 @@ impl Engine {
         let mut values = self.values();
         values.insert("case", text(case));
         let templates = &self.description.run;
-        let mesh = self.mesh_path(options);
-        if let (Some(mesh), Some(_)) = (&mesh, templates.format) {
+        let mut out = self.mesh_path(options);
+        if let (Some(mesh), Some(_)) = (&out, templates.format) {
             import::clear(options.place, mesh)?;
+            out = Some(import::foreign(options.place));
         }
-        let out = mesh.map(|mesh| match templates.format {
-            Some(_) => text(&import::foreign(options.place)),
-            None => text(&mesh),
-        });
+        let out = out.as_deref().map(text);
         let words = templates.words(&self.launcher, layout, options, out, values);
         let words = words.map_err(|end| self.failure(end))?;
         let mut command = Command::new(&words[0]);
