@@ -9,7 +9,7 @@ use crate::engine::paths::Paths;
 use crate::python;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result};
+use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure, Result, named};
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportedTree, Position, Request};
 use contract::lattice::Root;
@@ -245,8 +245,7 @@ pub(crate) fn complete(
         let empty = read_case()?.manifest(tree, label);
         let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
         set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
-        let written = set.manifest.write(mesh);
-        written.map_err(|error| unreadable(&format!("{}: {error}", mesh.display())))?;
+        set.manifest.write(mesh).map_err(|error| unreadable(&named(mesh, &error)))?;
     }
     Mesh::open(mesh).map_err(|error| unreadable(&error))
 }

@@ -123,13 +123,12 @@ fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak>
             point: root.to_user(component.first.centre()),
         }
     };
+    let is_flow_inside = terms.keep == Keep::Inside && !terms.seeds.is_empty();
     let has_leaked = |component: &&Component| {
         // All leaves of T0 within a leaf that no facet crosses have one side.
         let fine = truth.component_at(&component.first).map(|fine| fine.side);
         let leaks = match (component.side, fine) {
-            (Side::Inside, Some(Side::Outside)) => {
-                terms.seeds.is_empty() || terms.keep != Keep::Inside
-            }
+            (Side::Inside, Some(Side::Outside)) => !is_flow_inside,
             (Side::Outside, Some(Side::Inside)) => terms.keep == Keep::Inside,
             _ => false,
         };

@@ -122,11 +122,9 @@ impl ImportedTree {
                 written.is_ok()
             });
             written?;
-            match read {
-                Ok(()) if found == digest => Ok(()),
-                Ok(()) => Err(io::Error::other("the file changed while it was read")),
-                Err(error) => Err(io::Error::other(error)),
-            }
+            read.map_err(io::Error::other)?;
+            let changed = || io::Error::other("the file changed while it was read");
+            (found == digest).then_some(()).ok_or_else(changed)
         })
     }
 

@@ -185,11 +185,10 @@ impl Templates {
 fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<()> {
     let known = [&COMMON, own].concat();
     let mut named = words.iter().flat_map(|word| placeholders(word));
-    named.find(|name| !known.contains(name)).map_or(Ok(()), |name| {
-        let known = known.join(" ");
-        let why = format!("`{key}` has the unknown placeholder {{{name}}}; known are {known}");
-        Err(Failure::input(why))
-    })
+    let Some(name) = named.find(|name| !known.contains(name)) else { return Ok(()) };
+    let known = known.join(" ");
+    let why = format!("`{key}` has the unknown placeholder {{{name}}}; known are {known}");
+    Err(Failure::input(why))
 }
 
 /// The placeholders of a word, without their braces.

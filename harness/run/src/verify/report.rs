@@ -282,7 +282,7 @@ impl Report {
     /// A one-line summary.
     pub fn verdict(&self) -> String {
         let Tally { pass, fail, left_out } = self.tally();
-        let cases = self.cases.len();
+        let (cases, time_s) = (self.cases.len(), self.time_s);
         let end = match self.exit_code() {
             EXIT_HOLDS => "all hold",
             EXIT_FAILED => "FAILED",
@@ -291,8 +291,7 @@ impl Report {
             _ => "interrupted",
         };
         format!(
-            "cases: {cases}; checks: {pass} hold, {fail} fail, {left_out} left out; {:.1} s: {end}",
-            self.time_s
+            "cases: {cases}; checks: {pass} hold, {fail} fail, {left_out} left out; {time_s:.1} s: {end}"
         )
     }
 }
