@@ -83,6 +83,7 @@ const SEGMENTS_MAX: usize = 256;
 
 /// The segments that remain after cancellation. A vertex lies on a segment if it is within `tolerance` of it.
 pub fn uncancelled(segments: Vec<Use>, points: &[[f64; 3]], tolerance: f64) -> Vec<Use> {
+    let point = |v: u32| Point::from(points[v as usize]);
     let mut at: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
     for (i, segment) in segments.iter().enumerate() {
         segment.ends.iter().for_each(|&v| at[v as usize].push(i as u32));
@@ -91,10 +92,13 @@ pub fn uncancelled(segments: Vec<Use>, points: &[[f64; 3]], tolerance: f64) -> V
     let mut waiting: Vec<u32> = (0..points.len() as u32).rev().collect();
     while let Some(v) = waiting.pop() {
         at[v as usize].retain(|&i| segments[i as usize].is_some_and(|s| s.ends.contains(&v)));
-        let Some((long, short)) = overlap(v, &at[v as usize], &segments, points, tolerance) else {
-            continue;
+        let end = |i: u32| {
+            let ends = segments[i as usize].expect("retained").ends;
+            ends[usize::from(ends[0] == v)]
         };
-        let end = |i: u32| segments[i as usize].map(|s| other(s, v)).expect("retained");
+        let along = |&i: &u32| (i, point(end(i)) - point(v));
+        let leaving: Vec<(u32, Point)> = at[v as usize].iter().map(along).collect();
+        let Some((long, short)) = overlap(&leaving, tolerance) else { continue };
         let (far, near) = (end(long), end(short));
         segments[short as usize] = None;
         let rest = segments[long as usize].filter(|_| far != near);
@@ -105,22 +109,13 @@ pub fn uncancelled(segments: Vec<Use>, points: &[[f64; 3]], tolerance: f64) -> V
     segments.into_iter().flatten().collect()
 }
 
-/// Two segments that leave a vertex in the same direction, the longer first.
-fn overlap(
-    v: u32,
-    at: &[u32],
-    segments: &[Option<Use>],
-    points: &[[f64; 3]],
-    tolerance: f64,
-) -> Option<(u32, u32)> {
-    if at.len() > SEGMENTS_MAX {
+/// Two of the segments that leave a vertex, with their vectors from it, in the same direction, the longer first.
+fn overlap(leaving: &[(u32, Point)], tolerance: f64) -> Option<(u32, u32)> {
+    if leaving.len() > SEGMENTS_MAX {
         return None;
     }
-    let point = |v: u32| Point::from(points[v as usize]);
-    let along = |i: u32| point(other(segments[i as usize].expect("retained"), v)) - point(v);
-    for (n, &i) in at.iter().enumerate() {
-        for &j in &at[n + 1..] {
-            let (p, q) = (along(i), along(j));
+    for (n, &(i, p)) in leaving.iter().enumerate() {
+        for &(j, q) in &leaving[n + 1..] {
             let is_longer = p.length_squared() >= q.length_squared();
             let (long, short) = if is_longer { (p, q) } else { (q, p) };
             let t = short.dot(long) / long.length_squared();
@@ -130,10 +125,6 @@ fn overlap(
         }
     }
     None
-}
-
-fn other(segment: Use, v: u32) -> u32 {
-    segment.ends[usize::from(segment.ends[0] == v)]
 }
 
 /// Directions on either side of the middle one that are tried at once.

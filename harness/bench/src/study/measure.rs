@@ -16,8 +16,10 @@ pub struct Measure {
     /// How a value is shown.
     unit: Unit,
     /// The value, or in one sentence what the runs do not report.
-    pub(super) of: fn(&Sample) -> Result<f64, String>,
+    pub(super) of: Value,
 }
+
+type Value = fn(&Sample) -> Result<f64, String>;
 
 /// The input of a measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,12 +52,7 @@ const PLAIN: Unit = (1.0, 3, "");
 const RATE: Unit = (1e-6, 2, " M cells/s");
 const PER_CELL: Unit = (1.0, 3, " B/cell");
 
-const fn measure(
-    name: &'static str,
-    input: Input,
-    unit: Unit,
-    of: fn(&Sample) -> Result<f64, String>,
-) -> Measure {
+const fn measure(name: &'static str, input: Input, unit: Unit, of: Value) -> Measure {
     Measure { name, input, unit, of }
 }
 
