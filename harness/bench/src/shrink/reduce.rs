@@ -14,21 +14,17 @@ use toml::Value;
 pub type Fails<'a> = &'a mut dyn FnMut(&Trial) -> bool;
 
 /// Returns the smallest trial reachable by steps that all fail.
-pub fn reduce(trial: Trial, fails: Fails) -> Trial {
-    let mut smallest = trial;
+pub fn reduce(mut smallest: Trial, fails: Fails) -> Trial {
     loop {
-        let (before, coarser) = (smallest.clone(), coarser(&smallest));
-        smallest = facets(first(smallest, fails, coarser), fails);
+        let before = smallest.clone();
+        smallest = facets(first(coarser(&smallest), smallest, fails), fails);
         // With all leaves kept, crossing and enclosed ones too, deletion is ruled out as a cause.
         let all = Some(Value::String("all".into()));
         for (key, value) in [("keep", all), ("keep_crossing", None), ("enclosed", None)] {
-            let simpler = with(&smallest, key, value);
-            smallest = first(smallest, fails, [simpler]);
+            smallest = first([with(&smallest, key, value)], smallest, fails);
         }
-        for simpler in [thinner, fewer_ranks] {
-            let changed = simpler(&smallest);
-            smallest = first(smallest, fails, changed);
-        }
+        smallest = first(thinner(&smallest), smallest, fails);
+        smallest = first(fewer_ranks(&smallest), smallest, fails);
         // Seeds that remain stay where they are: a case in which one has come to lie in a crossing leaf is refused by every program and
         // does not fail.
         for list in ["box", "seeds"] {
@@ -53,7 +49,7 @@ pub fn size(trial: &Trial) -> String {
 }
 
 /// Returns the first changed trial that still fails, or the trial itself.
-fn first(trial: Trial, fails: Fails, changed: impl IntoIterator<Item = Trial>) -> Trial {
+fn first(changed: impl IntoIterator<Item = Trial>, trial: Trial, fails: Fails) -> Trial {
     changed.into_iter().find(|smaller| *smaller != trial && fails(smaller)).unwrap_or(trial)
 }
 
@@ -113,8 +109,7 @@ fn entries(trial: Trial, fails: Fails, key: &str) -> Trial {
 }
 
 /// Delta debugging (Zeller's ddmin, complements only). At the end no single item can be removed.
-fn minimal<T: Clone>(items: Vec<T>, mut fails: impl FnMut(&[T]) -> bool) -> Vec<T> {
-    let mut kept = items;
+fn minimal<T: Clone>(mut kept: Vec<T>, mut fails: impl FnMut(&[T]) -> bool) -> Vec<T> {
     if !kept.is_empty() && fails(&[]) {
         return Vec::new();
     }
