@@ -80,10 +80,8 @@ impl Edges {
             }
         }
         // At the edges of slivers: the number of facets, and the exclusive or of their numbers, which is the last one of them.
-        let mut left: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
-        for one in uses.iter().filter(|one| is_sliver(one.facet)) {
-            left.insert(one.ends, (0, 0));
-        }
+        let of_slivers = uses.iter().filter(|one| is_sliver(one.facet));
+        let mut left: HashMap<_, (u32, u32)> = of_slivers.map(|one| (one.ends, (0, 0))).collect();
         for one in &uses {
             let of_sliver = left.entry(one.ends);
             of_sliver.and_modify(|(count, of)| (*count, *of) = (*count + 1, *of ^ one.facet));

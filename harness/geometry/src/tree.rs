@@ -55,11 +55,10 @@ impl FacetTree {
     /// The facets no farther than `radius`, nearest first.
     pub fn within(&self, at: Point, radius: f64) -> Vec<u32> {
         let around = Aabb::from_half_extents(at, Point::splat(radius));
-        let distances =
-            self.in_box(&around).map(|facet| (facet, from_point(at, self.triangle(facet))));
-        let mut found: Vec<(u32, f64)> = distances.filter(|(_, d)| *d <= radius).collect();
-        found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        found.into_iter().map(|(facet, _)| facet).collect()
+        let distance = |facet: &u32| from_point(at, self.triangle(*facet));
+        let mut found: Vec<u32> = self.in_box(&around).filter(|f| distance(f) <= radius).collect();
+        found.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
+        found
     }
 
     /// The facets whose bounding boxes meet a box.
@@ -125,9 +124,8 @@ pub fn from_point(at: Point, facet: &Triangle) -> f64 {
 
 /// Distance of a segment from a triangle's edges.
 pub fn from_edges(segment: &Segment, facet: &Triangle) -> f64 {
-    let distances =
-        facet.edges().map(|edge| distance_segment_segment(&Pose::IDENTITY, segment, &edge));
-    distances.into_iter().fold(f64::INFINITY, f64::min)
+    let distance = |edge: &Segment| distance_segment_segment(&Pose::IDENTITY, segment, edge);
+    facet.edges().iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -22,11 +22,6 @@ use parry3d_f64::shape::Segment;
 /// Exceeds the rounding of printed points, in lattice units.
 const ROUNDING: f64 = 2.0;
 
-/// Two positions or lengths on the lattice are equal but for rounding.
-fn is_near(a: f64, b: f64) -> bool {
-    (a - b).abs() <= ROUNDING + 1e-9 * b.abs()
-}
-
 impl Passage {
     /// Asserts the invariants of a path between two ends, with the sorted words of the base tree that it leads through, and of that whose
     /// outside has the far field.
@@ -105,7 +100,8 @@ impl Passage {
         let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
         let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
         let widths = [Some(counted.fold(f64::INFINITY, f64::min)), Some(nearest), rim];
-        let are_near = widths.iter().all(|w| w.is_some_and(|w| is_near(w, width)));
+        let is_near = |w: f64| (w - width).abs() <= ROUNDING + 1e-9 * width.abs();
+        let are_near = widths.iter().all(|w| w.is_some_and(is_near));
         assert!(are_near, "width {width}; of all points, to all facets, at the rim {widths:?}");
     }
 }
