@@ -227,10 +227,8 @@ impl<'a> Space<'a> {
             uninterrupted()?;
             joined.clear();
             self.neighbours(cell, &mut joined);
+            joined.retain(|&next| self.cells[next as usize].is_open);
             for &next in &joined {
-                if !self.cells[next as usize].is_open {
-                    continue;
-                }
                 let wide = width(self, next).min(self.through(cell, next)) as f32;
                 let [here, there] = [cell, next].map(|cell| self.cells[cell as usize]);
                 let step = here.centre().distance(there.centre()) as f32;
