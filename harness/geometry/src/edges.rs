@@ -166,7 +166,6 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
 /// Facets without area with a corner, or the middle of an edge, on no facet with area, as where a strip of triangles continues elsewhere. One
 /// on the others, as of a T-junction, changes nothing.
 pub fn stray(input: &Input, first: usize) -> Finding {
-    let mut finding = Finding::new(Kind::Stray);
     let has_area = |facet: &&FacetLattice| normal(facet) != [0; 3];
     let all = &input.case.facets_lattice;
     // Without slivers, of which any number may lie on one another.
@@ -177,13 +176,11 @@ pub fn stray(input: &Input, first: usize) -> Finding {
         let around = Aabb::from_half_extents(middle, Point::splat(TOUCHING));
         !tree.in_box(&around).any(|facet| from_point(middle, tree.triangle(facet)) <= TOUCHING)
     };
-    for (facet, corners) in (0..).zip(all).filter(|(_, corners)| !has_area(corners)) {
-        let ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));
-        if ends.into_iter().any(is_off) {
-            finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
-        }
-    }
-    finding
+    Finding::at(Kind::Stray, input, first, |facet| {
+        let corners = &all[facet as usize];
+        let mut ends = lattice::edges(corners).into_iter().chain(corners.map(|at| [at, at]));
+        !has_area(&corners) && ends.any(is_off)
+    })
 }
 
 /// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. Two with a solid behind each, by the numbers of

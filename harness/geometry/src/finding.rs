@@ -98,6 +98,15 @@ impl Finding {
         Self { kind, count: 0, count_changing: 0, is_lower_bound: false, meaning, places }
     }
 
+    /// A finding at each facet of which this holds.
+    pub fn at(kind: Kind, input: &Input, first: usize, holds: impl Fn(u32) -> bool) -> Self {
+        let mut finding = Self::new(kind);
+        for facet in (0..input.case.facets.len() as u32).filter(|&facet| holds(facet)) {
+            finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
+        }
+        finding
+    }
+
     /// Counts one occurrence and lists its place if it is among the first.
     pub fn add(&mut self, first: usize, place: impl FnOnce() -> Place) {
         self.count += 1;
@@ -158,16 +167,12 @@ impl Kind {
 
 /// Facets with a coordinate near which f32 numbers are more than half a cell apart.
 pub fn rounded(input: &Input, first: usize) -> Finding {
-    let mut finding = Finding::new(Kind::Rounded);
-    for (facet, corners) in (0..).zip(input.case.facets.chunks(1)) {
-        let all = corners.as_flattened().as_flattened();
-        let far = all.iter().fold(0f32, |far, c| far.max(c.abs()));
-        let cell = input.cell_in(&bounds(corners)).unwrap_or(f64::INFINITY);
-        if f64::from(far.next_up() - far) > cell / 2.0 {
-            finding.add(first, || Place::new(vec![facet], input.centroid(facet)));
-        }
-    }
-    finding
+    Finding::at(Kind::Rounded, input, first, |facet| {
+        let corners = input.case.facets[facet as usize];
+        let far = corners.as_flattened().iter().fold(0f32, |far, c| far.max(c.abs()));
+        let cell = input.cell_in(&bounds(&[corners])).unwrap_or(f64::INFINITY);
+        f64::from(far.next_up() - far) > cell / 2.0
+    })
 }
 
 /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.
@@ -246,7 +251,7 @@ mod tests {
         let root = Some(Root { origin: [0.0; 3], edge });
         let requested =
             Requested { spacing_min: with_cell.then_some(4.0), root, ..Requested::default() };
-        Input::new(vec![FACET], requested).unwrap()
+        Input::of(Default::default(), vec![FACET], requested).unwrap()
     }
 
     /// The meaning of places of which the first is this wide.

@@ -56,7 +56,6 @@ impl Input {
     /// # Errors
     /// If a file cannot be read or the geometry cannot be meshed.
     pub fn read(path: &Path, requested: Requested) -> Result<Self> {
-        let wrong = |why: String| Failure::about(path, why);
         let is_case = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         let (mut table, Body { facets, solids }, seeds) = match is_case {
             true => {
@@ -67,7 +66,8 @@ impl Input {
         };
         // A seed may lie beyond another root.
         table.retain(|key, _| key != "seeds" && (key != "root" || requested.root_scale.is_none()));
-        let mut input = Self::of(table, facets, requested).map_err(wrong)?;
+        let input = Self::of(table, facets, requested);
+        let mut input = input.map_err(|why| Failure::about(path, why))?;
         input.case.solids = solids;
         if !seeds.is_empty() {
             let at = seeds.iter().filter_map(|&seed| input.case.root.quantise(seed));
@@ -81,25 +81,16 @@ impl Input {
         Ok(input)
     }
 
-    /// A geometry in memory.
+    /// A geometry with the keys of its case file, if it has one, that no other ones replace.
     ///
     /// # Errors
     /// One sentence if the geometry cannot be meshed: it has no facets or too many, a vertex is not finite or too
-    /// far outside the root, or root and spacing contradict the definition.
-    pub fn new(facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
-        Self::of(Table::new(), facets, requested)
-    }
-
-    /// A geometry with the keys of its case file that no other ones replace.
-    ///
-    /// # Errors
-    /// As [`Self::new`], or if a key is not one of a case file.
+    /// far outside the root, or root and spacing contradict the definition; or if a key is not one of a case file.
     pub fn of(mut table: Table, facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
-        if facets.is_empty() {
-            return Err("the geometry has no facets".to_owned());
-        }
-        if facets.len() > FACETS_MAX {
-            return Err(format!("{} facets exceed the limit of {FACETS_MAX}", facets.len()));
+        match facets.len() {
+            0 => return Err("the geometry has no facets".to_owned()),
+            1..=FACETS_MAX => {}
+            n => return Err(format!("{n} facets exceed the limit of {FACETS_MAX}")),
         }
         table.extend(Table::try_from(requested).expect("numbers are representable in TOML"));
         let is_known = table.contains_key("spacing_min");
@@ -165,10 +156,13 @@ mod tests {
     fn root_and_cell_follow_the_definition() {
         let requested =
             Requested { spacing_min: Some(0.3), root_scale: Some(2.0), ..Requested::default() };
-        let input = Input::new(vec![FACET], requested).unwrap();
+        let input = Input::of(Default::default(), vec![FACET], requested).unwrap();
         assert_eq!(input.case.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
         assert_eq!(input.cell, Some(0.25));
-        assert_eq!(Input::new(vec![FACET], Requested::default()).unwrap().cell, None);
+        assert_eq!(
+            Input::of(Default::default(), vec![FACET], Requested::default()).unwrap().cell,
+            None
+        );
     }
 
     #[test]
@@ -210,7 +204,9 @@ mod tests {
 
     #[test]
     fn a_geometry_that_cannot_be_meshed_is_refused() {
-        let why = |facets: Vec<Facet>, requested| Input::new(facets, requested).unwrap_err();
+        let why = |facets: Vec<Facet>, requested| {
+            Input::of(Default::default(), facets, requested).unwrap_err()
+        };
         let mut broken = FACET;
         broken[1][2] = f32::NAN;
         let root = Some(Root { origin: [0.0; 3], edge: 4.0 });

@@ -60,11 +60,9 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
 /// Facets with an even number of solids on their inner side. The surfaces that bound them may cross only where facets of both have
 /// edges, so that no pair intersects.
 pub fn overlaps(input: &Input, solids: &BTreeMap<u32, i64>, first: usize) -> Finding {
-    let mut finding = Finding::new(Kind::Overlaps);
-    for (&f, _) in solids.iter().filter(|(_, count)| **count > 0 && **count % 2 == 0) {
-        finding.add(first, || Place::new(vec![f], input.centroid(f)));
-    }
-    finding
+    Finding::at(Kind::Overlaps, input, first, |facet| {
+        solids.get(&facet).is_some_and(|count| *count > 0 && count % 2 == 0)
+    })
 }
 
 /// The number of solids just behind the middle of each facet, on its inner side, but for copies of the same winding. Only closed shells of
@@ -169,7 +167,7 @@ mod tests {
         let plane = A.map(|v| v.map(|c| c as f32));
         let [p, q, r] = plane;
         let facets = vec![plane, across, [r, q, p]];
-        let input = Input::new(facets, Requested::default()).unwrap();
+        let input = Input::of(Default::default(), facets, Requested::default()).unwrap();
         let lattice = &input.case.facets_lattice;
         let shells = Shells::new(&Edges::new(&input.case.facets, lattice), lattice);
         let mut tree = FacetTree::new(lattice);

@@ -211,7 +211,7 @@ mod tests {
         let root = Root { origin: [-8.0; 3], edge: 16.0 };
         let requested =
             Requested { spacing_min: Some(4.0), root: Some(root), ..Requested::default() };
-        let right = diagnose(&Input::new(facets, requested).unwrap(), 5);
+        let right = diagnose(&Input::of(Default::default(), facets, requested).unwrap(), 5);
         let index = |kind| right.findings.iter().position(|f| f.kind == kind).unwrap();
         let [openings, walls, winding] =
             [Kind::Openings, Kind::ThinWalls, Kind::Winding].map(index);

@@ -79,8 +79,7 @@ fn hits(
     may_be: impl Fn(u32, u32) -> bool,
 ) -> (Vec<Hit>, bool) {
     let (mut hits, visits) = (Vec::new(), Cell::new(0));
-    let area: f64 = tree.firsts.iter().map(|&facet| tree.triangle(facet).area()).sum();
-    let part = area / STARTS;
+    let part = tree.firsts.iter().map(|&facet| tree.triangle(facet).area()).sum::<f64>() / STARTS;
     for &facet in &tree.firsts {
         let Some(outward) = normal(facet) else { continue };
         let triangle = tree.triangle(facet);

@@ -15,7 +15,7 @@ const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
 
 fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
     let requested = Requested { spacing_min, root: Some(ROOT), ..Requested::default() };
-    diagnose(&Input::new(facets, requested).unwrap(), 5)
+    diagnose(&Input::of(Default::default(), facets, requested).unwrap(), 5)
 }
 
 fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
@@ -96,7 +96,7 @@ fn the_rim_of_a_half_model_in_a_face_of_the_root_is_no_opening() {
     let openings = |x: f64| {
         let root = Some(Root { origin: [x, -4.0, -4.0], edge: 16.0 });
         let requested = Requested { spacing_min: Some(0.25), root, ..Requested::default() };
-        diagnose(&Input::new(facets.clone(), requested).unwrap(), 5)
+        diagnose(&Input::of(Default::default(), facets.clone(), requested).unwrap(), 5)
             .finding(Kind::Openings)
             .unwrap()
             .count
@@ -113,7 +113,7 @@ fn vertices_that_f32_numbers_cannot_hold_are_found() {
     // Such numbers are half a unit apart.
     for (spacing, rounded) in [(0.5, 12), (2.0, 0)] {
         let requested = Requested { spacing_min: Some(spacing), root, ..Requested::default() };
-        let found = diagnose(&Input::new(facets.clone(), requested).unwrap(), 5);
+        let found = diagnose(&Input::of(Default::default(), facets.clone(), requested).unwrap(), 5);
         assert_eq!(count(&found, Kind::Rounded), rounded);
     }
     // All but the lower face reach into a box with finer cells.
@@ -521,7 +521,7 @@ fn a_vertex_farther_from_an_edge_than_two_lattice_units_leaves_an_opening() {
                 edge: f64::from(edge),
             });
             let requested = Requested { spacing_min: None, root, ..Requested::default() };
-            let input = Input::new(facets, requested).unwrap();
+            let input = Input::of(Default::default(), facets, requested).unwrap();
             let found = count(&diagnose(&input, 5), Kind::Openings);
             assert_eq!(found, openings, "{units} units, {scale}");
         }
@@ -723,7 +723,7 @@ fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
     for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no cells")] {
         let requested =
             Requested { spacing_min: spacing, root: Some(ROOT), ..Requested::default() };
-        let input = Input::new(facets.clone(), requested).unwrap();
+        let input = Input::of(Default::default(), facets.clone(), requested).unwrap();
         texts += &format!("== {name}\n{}", diagnose(&input, first));
     }
     assert_text(&texts, "tests/geometry/expected.txt");
