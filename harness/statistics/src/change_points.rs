@@ -121,9 +121,7 @@ impl<'a> Model<'a> {
         // Steps of exact counters may be two values apart, also in short series.
         let count_max = (values.len() / 2).clamp(2, SEGMENTS_MAX) - 1;
         let mut models: Vec<(f64, Self)> = Vec::new();
-        for (phi, mean) in
-            PHIS.iter().flat_map(|phi| [(*phi, Mean::Constant), (*phi, Mean::Linear)])
-        {
+        for (phi, mean) in PHIS.iter().flat_map(|&p| [(p, Mean::Constant), (p, Mean::Linear)]) {
             let series = Series::new(values, phi);
             let found = series.boundaries(mean, count_max);
             models.extend((0..=found.len()).map(|count| {

@@ -102,8 +102,7 @@ fn quantile(sorted: &[f64], fraction: f64) -> f64 {
 /// Returns the population standard deviation.
 fn deviation(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (squares / values.len() as f64).sqrt()
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 /// Fraction of the values discarded at either end.

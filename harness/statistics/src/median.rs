@@ -39,12 +39,10 @@ impl Median {
 pub fn median(values: &[f64]) -> Option<Median> {
     let sorted = sorted(values.iter().copied());
     let n = sorted.len();
-    if n == 0 {
-        return None;
-    }
+    let last = n.checked_sub(1)?;
     // The narrowest interval with the desired coverage; the whole range if none has it.
     let cut = (0..n.div_ceil(2)).rev().find(|&k| coverage(n, k) >= COVERAGE).unwrap_or(0);
-    let (low, high) = (sorted[cut], sorted[n - 1 - cut]);
+    let (low, high) = (sorted[cut], sorted[last - cut]);
     Some(Median { value: middle(&sorted), low, high, coverage: coverage(n, cut), count: n })
 }
 
