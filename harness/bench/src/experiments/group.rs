@@ -39,12 +39,11 @@ impl Group {
     /// Groups the repetitions of one setup; `None` for no repetitions.
     fn of(setup: Setup, repetitions: &[&(Run, Network)]) -> Option<Self> {
         let network = repetitions.last()?.1;
-        let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &network);
-        let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
-        let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
-        let nearest = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
-        let mut typical = nearest.0.clone();
         let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
+        let time_of = |run: &Run| pop::time_s(run, &network);
+        let mut time_s = median(&runs.iter().map(time_of).collect::<Vec<f64>>())?;
+        let off = |run: &Run| (time_of(run) - time_s.value).abs();
+        let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
             typical.time_wall_s = time_s.value;
@@ -86,6 +85,11 @@ impl Group {
         let value = pop::imbalance(&self.typical)?;
         let (low, high) = (repeated.low.min(value), repeated.high.max(value));
         Some(Median { value, low, high, ..repeated })
+    }
+
+    /// Returns the load imbalance of cells, max / mean, if the program counts them by rank.
+    pub fn lambda_cells(&self) -> Option<f64> {
+        Some(self.typical.counters.get("leaves")?.lambda(self.setup.ranks))
     }
 
     /// Returns the CPU time of the whole process, in seconds; `None` if it is unknown in a run.
@@ -397,12 +401,11 @@ fn apart(
     [programs, cases]: &mut [Origins; 2],
 ) -> Setup {
     let mut setup = run.setup.clone();
-    let mut machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
-    if let Some(given) = network.filter(|network| network.is_given()) {
-        machine += &format!("{given}; ");
-    }
-    machine += &format!("program {}", run.program);
-    setup.engine += &programs.suffix(&run.setup.engine, &machine);
+    let machine = session.map(|session| session.machine.label());
+    let given = network.filter(|network| network.is_given()).map(Network::to_string);
+    let origin = [machine, given, Some(format!("program {}", run.program))];
+    let origin = origin.into_iter().flatten().collect::<Vec<_>>().join("; ");
+    setup.engine += &programs.suffix(&run.setup.engine, &origin);
     setup.case += &cases.suffix(&case_of(&run.setup), &run.inputs);
     if let Some(digest) = &run.geometry {
         let Setup { spacing_min, layer_cells_min: n, .. } = &setup;
