@@ -37,9 +37,6 @@ pub struct Efficiency {
     pub computation_scaling: f64,
 }
 
-/// A factor of efficiency, or a product of factors.
-pub type Factor = fn(&Efficiency) -> f64;
-
 impl Efficiency {
     /// Serialisation and transfer together.
     pub fn communication(&self) -> f64 {
@@ -142,7 +139,7 @@ fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
 /// # Panics
 /// If an efficiency exceeds 1 and no factor can be the reason: then a factor is wrong.
 pub fn above_one(all: &[Efficiency]) -> Option<String> {
-    let exceeds = |factor: Factor| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
+    let exceeds = |factor: fn(&Efficiency) -> f64| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
     let scaling = exceeds(|e| e.computation_scaling).then_some(
         "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: the cost of the \
          same facets does not grow with the mesh, smaller parts of a mesh fit into caches better, or the base case was disturbed.",
@@ -195,20 +192,19 @@ pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
     let worst = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let (factor, loss, weight) = worst.expect("four losses are compared");
     let phase = run.phases.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)));
-    let why = match phase {
-        _ if factor > 1.0 - LOSS_MIN => "no single cause costs more than 3 %".to_owned(),
-        None => UNKNOWN.to_owned(),
-        Some(Phase { name, useful_s, .. }) => {
-            let (percent, lambda) = (100.0 * (1.0 - factor), useful_s.lambda(ranks));
-            let rank = useful_s.at;
-            let part = heaviest_base_leaf(run).filter(|leaf| leaf * ranks as f64 > 1.0);
-            let leaf = part.map_or(String::new(), |leaf| {
-                format!("; a single base leaf holds {:.1} % of the cells", 100.0 * leaf)
-            });
-            format!(
-                "{loss} ({percent:.0} %), mostly in the phase {name}, where rank {rank} is slowest (lambda {lambda:.2}){leaf}"
-            )
-        }
+    let Phase { name, useful_s, .. } = phase.expect("without phases, efficiencies are unknown");
+    let why = if factor > 1.0 - LOSS_MIN {
+        "no single cause costs more than 3 %".to_owned()
+    } else {
+        let (percent, lambda) = (100.0 * (1.0 - factor), useful_s.lambda(ranks));
+        let rank = useful_s.at;
+        let part = heaviest_base_leaf(run).filter(|leaf| leaf * ranks as f64 > 1.0);
+        let leaf = part.map_or(String::new(), |leaf| {
+            format!("; a single base leaf holds {:.1} % of the cells", 100.0 * leaf)
+        });
+        format!(
+            "{loss} ({percent:.0} %), mostly in the phase {name}, where rank {rank} is slowest (lambda {lambda:.2}){leaf}"
+        )
     };
     let above = above_one(&[e]).map_or(String::new(), |reason| format!(". {reason}"));
     format!("{of} efficiency of {percent:.0} % at {ranks} ranks: {why}{above}")

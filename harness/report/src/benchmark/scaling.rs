@@ -7,9 +7,7 @@ use super::groups::{
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::pop::{
-    DISTURBED, Efficiency, Factor, above_one, heaviest_base_leaf, phase_s,
-};
+use bench::experiments::pop::{DISTURBED, Efficiency, above_one, heaviest_base_leaf, phase_s};
 use bench::order::{by_key, distinct};
 use contract::number::{digits, grouped};
 use contract::paper::{number, speedup as speedup_of_paper};
@@ -128,7 +126,7 @@ fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) ->
     let known = sims.iter().filter_map(|group| Some((*group, groups.efficiency(group)?)));
     let (sims, efficiencies): (Vec<&Group>, Vec<Efficiency>) = known.unzip();
     let (sims, last) = (&sims[..], sims.last().filter(|_| sims.len() > 1)?);
-    let factors: [(&str, Factor); 5] = [
+    let factors: [(_, fn(&Efficiency) -> _); 5] = [
         ("global", Efficiency::global),
         ("parallel", Efficiency::parallel),
         ("load balance", |e| e.load_balance),
@@ -173,12 +171,11 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
     let points: Vec<Point> = times.enumerate().map(|(r, s)| Point::exact(r as f64, *s)).collect();
     let last = points.last()?.x;
     let lambda = run.useful_s.lambda(ranks);
-    let by_cells = run.counters.get("leaves").map(|leaves| leaves.lambda(ranks));
     let mut caption = format!(
         "Useful time (CPU time outside communication) per rank: {subject}, {} cells, projected from {ranks} simulated ranks. Load imbalance λ = max/mean: \
          {lambda:.3} by time{}. {}",
         grouped(run.cells),
-        by_cells.map(|lambda| format!(", {lambda:.3} by cells")).unwrap_or_default(),
+        group.lambda_cells().map(|lambda| format!(", {lambda:.3} by cells")).unwrap_or_default(),
         rank_times(&[group])
     );
     if is_counterpart(subject.case) {
@@ -255,8 +252,7 @@ fn bars(name: &str, how: Provenance, style: usize, lengths: impl Iterator<Item =
 /// Load imbalance of cells of one mesh on several ranks, for weights and partitioners; `None` if some run did not count them.
 fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let (cells, ranks) = (of[0].cells(), of[0].setup.ranks);
-    let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
-    let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
+    let lambdas: Vec<f64> = of.iter().map(|g| g.lambda_cells()).collect::<Option<_>>()?;
     let ends = (-0.5, of.len() as f64 - 0.5);
     let mut series = vec![bars("cells", Provenance::Measured, 0, lambdas.into_iter())];
     // A base leaf is never divided, so no partition beats a rank that has only the largest one.
