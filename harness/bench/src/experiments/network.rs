@@ -3,6 +3,7 @@
 use super::entry::{ASSUMED, Network};
 use super::execute::Runner;
 use super::machine::cores;
+use crate::refuse;
 use contract::number::number;
 use run::engine::layout::node_count;
 use run::engine::process::{self, Watch};
@@ -33,14 +34,12 @@ impl fmt::Display for Network {
 /// # Errors
 /// One sentence, if both ranks would share a core, or the ping-pong is missing or fails.
 pub fn measured(runner: &Runner) -> Result<Network, String> {
-    if cores() * node_count() < 2 {
-        return Err("the two ranks of a ping-pong would share one core".to_owned());
-    }
     let program = runner.programs.mesher.program.with_file_name("pingpong");
-    if !program.is_file() {
-        let program = program.display();
-        return Err(format!("{program} is missing: build the mesher with --features mpi"));
-    }
+    let shown = program.display();
+    refuse(&[
+        (cores() * node_count() < 2, "the two ranks of a ping-pong would share one core"),
+        (!program.is_file(), &format!("{shown} is missing: build the mesher with --features mpi")),
+    ])?;
     let one = |_| {
         let watch = Watch::new("pingpong", PING_PONG_LIMIT, runner.place);
         let (mut command, _shared) = runner.launcher.command(2, &program);

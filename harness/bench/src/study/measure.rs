@@ -1,7 +1,8 @@
 //! The measures, each a function of the medians of the repetitions of runs. reports/README.md defines them.
 
 use crate::experiments::group::Group;
-use crate::experiments::pop;
+use crate::experiments::pop::{self, UNKNOWN};
+use crate::refuse;
 use Input::{Against, Alone, Phases, Series};
 use contract::number::grouped;
 use serde::de::{Deserialize, Deserializer, Error};
@@ -80,15 +81,13 @@ pub static MEASURES: [Measure; 15] = [
     measure("lambda_cells_ratio", Against, PLAIN, |s| {
         Ok(lambda_cells(s.run)? / lambda_cells(s.against)?)
     }),
-    measure("lambda_cpu", Alone, PLAIN, |s| {
-        pop::imbalance(&s.run.typical).ok_or(pop::UNKNOWN.to_owned())
-    }),
+    measure("lambda_cpu", Alone, PLAIN, |s| Ok(pop::imbalance(&s.run.typical).ok_or(UNKNOWN)?)),
     measure("efficiency", Against, PLAIN, |s| match s.against.setup.ranks {
         1 => Ok(s.run.global_efficiency(s.against)),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
     measure("parallel_efficiency", Alone, PLAIN, |s| {
-        s.run.efficiency(s.run).map(|e| e.parallel()).ok_or(pop::UNKNOWN.to_owned())
+        Ok(s.run.efficiency(s.run).ok_or(UNKNOWN)?.parallel())
     }),
     measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];
@@ -129,20 +128,19 @@ fn reported(memory: Option<statistics::Median>) -> Result<f64, String> {
 }
 
 fn lambda_cells(run: &Group) -> Result<f64, String> {
-    let leaves = run.typical.counters.get("leaves");
-    Ok(leaves.ok_or("the program does not count leaves by rank")?.lambda(run.setup.ranks))
+    run.lambda_cells().ok_or("the program does not count leaves by rank".to_owned())
 }
 
 /// Marginal memory per cell. The other run has the same facets on equally many ranks at a coarse spacing, so its memory is that of the
 /// program, MPI and the facets.
 fn beyond(run: &Group, coarse: &Group) -> Result<f64, String> {
-    if run.setup.ranks != coarse.setup.ranks || run.runs[0].facets != coarse.runs[0].facets {
-        return Err("the other run must be of the same facets on as many ranks".to_owned());
-    }
-    if coarse.cells() >= run.cells() {
-        let cells = grouped(coarse.cells());
-        return Err(format!("the other run must have fewer cells, and has {cells}"));
-    }
+    let of = |group: &Group| (group.setup.ranks, group.runs[0].facets);
+    let cells = grouped(coarse.cells());
+    let many = format!("the other run must have fewer cells, and has {cells}");
+    refuse(&[
+        (of(run) != of(coarse), "the other run must be of the same facets on as many ranks"),
+        (coarse.cells() >= run.cells(), &many),
+    ])?;
     Ok((peak(run)? - peak(coarse)?) / (run.cells() - coarse.cells()) as f64)
 }
 
