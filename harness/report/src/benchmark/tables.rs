@@ -46,10 +46,7 @@ pub fn causes(groups: &Groups) -> Vec<String> {
 fn experiment(groups: &Groups, name: &str) -> Table {
     let of = groups.all.iter().filter(|g| g.setup.experiment == name);
     let of: Vec<(&Group, Option<Efficiency>)> = of.map(|g| (g, groups.efficiency(g))).collect();
-    let lambda = |group: &Group| {
-        let counted = group.typical.counters.get("leaves");
-        counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
-    };
+
     let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
     let of_base = |of: &Group, x: Option<f64>| shown(x.filter(|_| groups.has_reference(of)));
     let table = Table::of(
@@ -70,7 +67,7 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("coverage", &|(g, _)| format!("{} %", g.time_s.per_cent())),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
             ("λ\n(time)", &|(_, e)| shown(e.map(|e| 1.0 / e.load_balance))),
-            ("λ\n(cells)", &|(g, _)| lambda(g)),
+            ("λ\n(cells)", &|(g, _)| shown(g.lambda_cells())),
             ("serialisation", &|(_, e)| shown(e.map(|e| e.serialisation))),
             ("transfer", &|(_, e)| shown(e.map(|e| e.transfer))),
             ("parallel\nefficiency", &|(_, e)| shown(e.map(|e| e.parallel()))),
@@ -78,7 +75,7 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("global\nefficiency", &|(g, _)| of_base(g, Some(groups.global_efficiency(g).value))),
             ("base case", &|(g, _)| groups.reference(g).how_on()),
             ("10⁶\ncells / s / rank", &|(g, _)| format!("{:.2}", g.rates().value)),
-            ("bytes / cell", &|(g, _)| known(g.bytes_per_cell(), 2)),
+            ("bytes / cell", &|(g, _)| known(g.bytes_per_cell(), 2, "unknown")),
         ],
     );
     let efficiencies: Vec<Efficiency> = of.iter().filter_map(|(_, e)| *e).collect();
@@ -87,15 +84,13 @@ fn experiment(groups: &Groups, name: &str) -> Table {
         format!("Factors of {engine} are left out (–), and its efficiencies are of run times: {UNKNOWN}.")
     });
     let clocks = clocks(groups.all.iter().filter(|g| g.setup.experiment == name));
-    Table {
-        notes: above_one(&efficiencies).into_iter().chain(left_out).chain(clocks).collect(),
-        ..table
-    }
+    let notes = above_one(&efficiencies).into_iter().chain(left_out).chain(clocks).collect();
+    Table { notes, ..table }
 }
 
-/// A median with so many decimals, if it is known.
-fn known(of: Option<statistics::Median>, decimals: usize) -> String {
-    of.map_or("unknown".to_owned(), |of| format!("{:.decimals$}", of.value))
+/// A median with so many decimals, or what is said if it is not known.
+fn known(of: Option<statistics::Median>, decimals: usize, unknown: &str) -> String {
+    of.map_or(unknown.to_owned(), |of| format!("{:.decimals$}", of.value))
 }
 
 /// Projected and measured times of the same meshes on equally many ranks.
@@ -192,12 +187,10 @@ fn comparison(groups: &Groups, (case, n): (String, u32), of: Vec<&Group>) -> Opt
                 _ => g.setup.engine.clone(),
             }),
             ("cells", &|g| grouped(g.cells())),
-            ("CPU\ntime / s", &|g| known(g.cpu_s(), 3)),
-            ("of\nit\nsearch / s", &|g| {
-                search_s(g).map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
-            }),
-            ("10⁶\ncells / s / core", &|g| known(rate(g), 3)),
-            ("bytes / cell", &|g| known(g.bytes_per_cell(), 1)),
+            ("CPU\ntime / s", &|g| known(g.cpu_s(), 3, "unknown")),
+            ("of\nit\nsearch / s", &|g| known(search_s(g), 2, "not separate")),
+            ("10⁶\ncells / s / core", &|g| known(rate(g), 3, "unknown")),
+            ("bytes / cell", &|g| known(g.bytes_per_cell(), 1, "unknown")),
         ],
     );
     Some(Table { notes, ..table })
