@@ -117,10 +117,8 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
     let given = &bench.options.layers;
     let is_asked = |name: &LayerName| given.is_empty() && bench.asked(*name).next().is_some();
     let requested = |name: &LayerName| given.contains(name) || is_asked(name);
-    for name in LayerName::value_variants().iter().copied().filter(requested) {
-        if interrupt::requested() {
-            break;
-        }
+    let names = LayerName::value_variants().iter().copied().filter(requested);
+    for name in names.take_while(|_| !interrupt::requested()) {
         let start = Instant::now();
         crate::announce(&format!("harness gate: {name}"));
         let cases = bench.asked(name).map(|case| case.name.clone()).collect();
@@ -161,9 +159,8 @@ impl Bench<'_> {
         if layer == LayerName::Instructions {
             return numbers::instructions(self, &subject.engine, case);
         }
-        let mut counted = subject.counted.borrow_mut();
         let count = || numbers::count(self, &subject.engine, case);
-        counted.entry(case.name.clone()).or_insert_with(count).clone()
+        subject.counted.borrow_mut().entry(case.name.clone()).or_insert_with(count).clone()
     }
 
     /// Returns the file of a case in a form that an engine reads.

@@ -139,9 +139,8 @@ impl Rules {
     /// If the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self> {
         let mut rules: Self = read_toml(path)?;
-        let directory = path.parent().unwrap_or(Path::new(""));
         for case in rules.cases.iter_mut().filter(|case| case.name.ends_with(".toml")) {
-            let file = directory.join(&case.name);
+            let file = path.with_file_name(&case.name);
             case.name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             case.file = file;
         }

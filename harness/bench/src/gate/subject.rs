@@ -42,8 +42,7 @@ pub struct Subject {
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Result<Self> {
         engine.require()?;
-        let program = digest_of(engine.files());
-        let measured = Measured { named, revision, program };
+        let measured = Measured { named, revision, program: digest_of(engine.files()) };
         Ok(Self { engine, measured, counted: RefCell::default() })
     }
 
@@ -93,8 +92,7 @@ impl Subject {
         let status = ["status", "--porcelain", "--untracked-files=no"];
         let is_commit = built.is_some() || git(repository, &status).is_some_and(|of| of.is_empty());
         let program = program(build, built, repository)?;
-        let revision = is_commit.then_some(revision);
-        Self::new(engine.with_program(program)?, named.to_owned(), revision)
+        Self::new(engine.with_program(program)?, named.to_owned(), is_commit.then_some(revision))
     }
 }
 
