@@ -234,8 +234,7 @@ impl Spread {
         let at = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
         let keep = if values.len() <= BY_RANK_MAX { values } else { &[] };
         let (sum, by_rank) = (values.iter().sum(), keep.to_vec());
-        let max = values.get(at).copied().unwrap_or(0.0);
-        Self { sum, max, at, by_rank }
+        Self { sum, max: values.get(at).copied().unwrap_or(0.0), at, by_rank }
     }
 
     /// The same without values rank by rank.

@@ -54,16 +54,14 @@ pub fn digest_of(files: impl IntoIterator<Item = PathBuf>) -> String {
     let step = |state: u128, chunk: &[u8]| mix(word(chunk) ^ state as u64) ^ state.rotate_left(64);
     let digest = files.into_iter().try_fold(None, |state: Option<u128>, file| {
         let bytes = fs::read(file).ok()?;
-        let start = state.unwrap_or(0) ^ bytes.len() as u128;
-        Some(Some(bytes.chunks(7).fold(start, step)))
+        Some(Some(bytes.chunks(7).fold(state.unwrap_or(0) ^ bytes.len() as u128, step)))
     });
     digest.flatten().map_or(String::new(), |digest| format!("{digest:032x}"))
 }
 
 /// Returns the digest of those of an engine's files that an archive has. Interpreters and installed programs differ between machines.
 pub fn digest_of_scripts(engine: &Engine) -> String {
-    let here = &engine.description.here;
-    digest_of(engine.files().into_iter().filter(|file| file.starts_with(here)))
+    digest_of(engine.files().into_iter().filter(|file| file.starts_with(&engine.description.here)))
 }
 
 /// Returns the number of cores that this process may use.

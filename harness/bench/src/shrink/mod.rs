@@ -76,8 +76,7 @@ pub fn shrink(
     let (start, mut trials) = (Instant::now(), 1);
     let is_over = || start.elapsed() >= limit || interrupt::requested();
     let same = |trial: &Trial| -> Result<Option<Fault>> {
-        let mut faults = judge(trial)?.into_iter().filter_map(|one| one.1);
-        Ok(faults.find(|fault| fault.is_same_as(first)))
+        Ok(judge(trial)?.into_iter().filter_map(|one| one.1).find(|fault| fault.is_same_as(first)))
     };
     let mut fails = |trial: &Trial| {
         if is_over() {

@@ -115,18 +115,17 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     };
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
-    let efficiencies = runs.iter().filter_map(|run| run.efficiency(against));
-    let efficiencies: Vec<Efficiency> =
-        efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
+    let is_efficiency = row.measure.is_efficiency();
+    let above = runs.iter().filter_map(|run| run.efficiency(against));
+    let above: Vec<Efficiency> = above.filter(|e| is_efficiency && e.is_above_one()).collect();
     // The least trustworthy run counts.
     let ranking = ["serial", "measured", "oversubscribed", "projected"];
     let rank = |how: &&str| ranking.iter().position(|h| h == how);
     let how = runs.iter().chain([&against]).map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value =
         (row.measure.of)(&Sample { run: runs[0], runs: &runs, against, phases: &row.phase })?;
-    let is_above = row.measure.is_efficiency() && value > ABOVE_ONE;
-    let disturbed = is_above.then(|| DISTURBED.to_owned());
-    let why = above_one(&efficiencies).or(disturbed).unwrap_or_default();
+    let disturbed = (is_efficiency && value > ABOVE_ONE).then(|| DISTURBED.to_owned());
+    let why = above_one(&above).or(disturbed).unwrap_or_default();
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
 }
 

@@ -118,9 +118,8 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
 
 /// Writes a file unless another one is there.
 fn put(path: &Path, bytes: &[u8]) -> Result<()> {
-    let is_same = fs::read(path).map_or(true, |before| before == bytes);
     let why = format!("{}: two files of the study have this name: rename one", file_name(path));
-    Failure::unless(is_same, why)?;
+    Failure::unless(fs::read(path).map_or(true, |before| before == bytes), why)?;
     write_atomically(path, |out| out.write_all(bytes)).map_err(|error| Failure::at(path, error))
 }
 

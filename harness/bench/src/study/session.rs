@@ -264,9 +264,8 @@ impl Session<'_> {
     fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64> {
         let sizes = self.sizes.entry((base.stem.clone(), n)).or_default();
         cases::spacing(sizes, cells, base.coarse(), |spacing| {
-            let case = base.write(spacing, n, false)?;
             let setup = Setup::serial(&base.name, spacing, n);
-            self.runner.run(&setup, &case, None).map(|run| run.cells)
+            self.runner.run(&setup, &base.write(spacing, n, false)?, None).map(|run| run.cells)
         })
     }
 
@@ -399,8 +398,7 @@ impl Session<'_> {
         let run = self.runner.run(s, &point.case, repeat);
         match run.and_then(|run| self.check_mesh(point, &run).map(|()| run)) {
             Ok(run) => {
-                let inputs = point.inputs.clone();
-                self.append(Entry::Run(Box::new(Run { inputs, ..run })))
+                self.append(Entry::Run(Box::new(Run { inputs: point.inputs.clone(), ..run })))
             }
             Err(failure) => {
                 point.failed = true;
