@@ -61,13 +61,12 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let action = |(name, of): &(&str, Vec<&Line>)| {
         let opening = of.iter().find_map(|line| line.session())?;
         let used = programs(of).into_iter().map(|(_, digest)| id(&program_id(&digest)));
-        let used: Vec<Value> = used.collect();
         Some(json!({
             "@id": format!("#session-{name}"), "@type": "CreateAction",
             "name": shown(&opening.command),
             "description": opening.machine.to_string(),
             "startTime": of.first()?.time_utc, "endTime": of.last()?.time_utc,
-            "instrument": used, "object": id(&format!("{STUDY}/{}", package::STUDY)), "result": id(RECORD),
+            "instrument": used.collect::<Vec<_>>(), "object": id(&format!("{STUDY}/{}", package::STUDY)), "result": id(RECORD),
         }))
     };
     let actions: Vec<Value> = sessions.iter().filter_map(action).collect();
@@ -86,8 +85,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         "description": "The licence of this archive; those of geometries are in study/",
     });
     let author = json!({"@id": AUTHOR, "@type": "Person", "name": about.author});
-    let all: Vec<&Line> = lines.iter().collect();
-    let programs = programs(&all).iter().map(program).collect();
+    let programs = programs(&lines.iter().collect::<Vec<_>>()).iter().map(program).collect();
     let graph = [vec![head, root, of_licence, author], files, programs, actions].concat();
     json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
 }

@@ -38,8 +38,7 @@ pub fn junit(report: &GateReport) -> String {
     let mut xml = quick_junit::Report::new("harness gate");
     xml.set_time(Duration::from_secs_f64(report.time_s));
     for layer in &report.layers {
-        let left_out = layer.left_out.iter();
-        let left_out = left_out.map(|why| test("layer", skipped(format!("left out: {why}")), ""));
+        let whole = |why: &String| test("layer", skipped(format!("left out: {why}")), "");
         let of_finding = |finding: &GateFinding| {
             let GateFinding { case, metric, verdict, note, .. } = finding;
             let ended = match verdict {
@@ -52,7 +51,7 @@ pub fn junit(report: &GateReport) -> String {
             };
             test(format!("{case}: {metric}"), ended, &line(finding))
         };
-        let tests = left_out.chain(layer.findings.iter().map(of_finding));
+        let tests = layer.left_out.iter().map(whole).chain(layer.findings.iter().map(of_finding));
         xml.add_test_suite(suite(&layer.name.to_string(), layer.time_s, tests));
     }
     if xml.errors + xml.failures == 0 && !matches!(report.end(), End::Holds(_)) {

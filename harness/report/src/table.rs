@@ -42,8 +42,7 @@ impl Table {
             width => format!("{field:<width$}"),
         };
         let line = |row: &Vec<String>| {
-            let fields: Vec<String> = row.iter().enumerate().map(aligned).collect();
-            fields.join("  ").trim_end().to_owned()
+            row.iter().enumerate().map(aligned).collect::<Vec<_>>().join("  ").trim_end().to_owned()
         };
         let title = Some(self.title.clone()).filter(|title| !title.is_empty());
         let lines = title.into_iter().chain(all().map(line)).chain(self.notes.iter().cloned());

@@ -71,8 +71,7 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
         ]
     };
     let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];
-    let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
-    html! { h2 { "Change points" } (table(&columns, &rows)) }
+    html! { h2 { "Change points" } (table(&columns, &found.iter().map(row).collect::<Vec<_>>())) }
 }
 
 /// Both values of a step with their unit, and the change.
@@ -89,8 +88,7 @@ fn values(series: &Series, change: &Change) -> [String; 3] {
 
 /// Whether a step is for the `worse` or the `better`; `None` if it is neither.
 fn sign(series: &Series, change: &Change) -> Option<&'static str> {
-    let is_worse = series.is_worse(change.step.before, change.step.after)?;
-    Some(if is_worse { "worse" } else { "better" })
+    Some(if series.is_worse(change.step.before, change.step.after)? { "worse" } else { "better" })
 }
 
 /// All steps with their series.

@@ -27,10 +27,9 @@ pub fn markdown(report: &Report) -> String {
 
 fn table_of(report: &Report) -> Table {
     let columns = "case,facets,base,cells,ranks,hold,fail,left\nout,time\ns,M\ncells/s,B/cell";
-    let columns = columns.split(',').collect();
     let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
     check_rows(&rows, report);
-    Table { columns, rows, ..Table::default() }
+    Table { columns: columns.split(',').collect(), rows, ..Table::default() }
 }
 
 /// The rows of one case, each with one field per column.
@@ -39,8 +38,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let run = case.checks.iter().filter(|c| !matches!(c.outcome, Outcome::LeftOut { .. }));
     let counts: BTreeSet<usize> = run.filter_map(|check| check.ranks).collect();
     let sizes = [case.facets, case.leaves_base, case.cells].map(|size| size.to_string());
-    let (of_case, blank) =
-        ([vec![case.name.clone()], sizes.to_vec()].concat(), vec![String::new(); 4]);
+    let of_case = [vec![case.name.clone()], sizes.to_vec()].concat();
     let row_of = |ranks: Option<usize>| {
         let is_of = |run: &&Run| {
             let layout = run.layout.as_ref();
@@ -52,8 +50,8 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
         let is_in = |check: &&Check| check.ranks.filter(|n| counts.contains(n)) == ranks;
         let checks = Tally::of(case.checks.iter().filter(is_in));
         let label = ranks.map_or("serial".to_owned(), |ranks| ranks.to_string());
-        let head = ranks.map_or(&of_case, |_| &blank).iter().cloned();
-        head.chain([label]).chain(numbers(checks, fastest)).collect()
+        let head = ranks.map_or(of_case.clone(), |_| vec![String::new(); 4]);
+        [head, vec![label], numbers(checks, fastest)].concat()
     };
     [None].into_iter().chain(counts.iter().copied().map(Some)).map(row_of).collect()
 }

@@ -66,8 +66,7 @@ fn of(groups: &Groups, group: &Group, setup: &str) -> Vec<Number> {
         ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
-        let median = median.filter(|m| m.value.is_finite())?;
-        let Median { value, low, high, .. } = median;
+        let median @ Median { value, low, high, .. } = median.filter(|m| m.value.is_finite())?;
         let key = format!("{setup}/{name}");
         assert!(low <= value && value <= high, "{key}: {value} is not in its interval");
         let ends = [[low, high].map(digits).join("--"), median.per_cent().to_string()];

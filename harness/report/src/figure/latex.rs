@@ -110,10 +110,8 @@ pub fn tex(figure: &Figure) -> String {
 /// Colour, line and markers of a plot.
 fn plot_options(s: &Series) -> String {
     let (style, (filled, hollow)) = (s.style % COLOURS.len(), MARKS[s.style % MARKS.len()]);
-    let (line, mark) = match s.provenance {
-        Provenance::Measured => ("solid", filled),
-        _ => ("dashed", hollow),
-    };
+    let is_filled = s.provenance == Provenance::Measured;
+    let (line, mark) = if is_filled { ("solid", filled) } else { ("dashed", hollow) };
     let line = if s.kind == Kind::Scattered { "only marks" } else { line };
     match (s.kind, s.provenance) {
         (Kind::Bars, _) => {

@@ -137,9 +137,8 @@ impl Picture {
             cube
         });
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
-        let has_area = (0..2).all(|i| window[0][i] < window[1][i]);
         let why = "the clip box has no area in the plane of the slice: give a larger one";
-        Failure::unless(has_area, why)?;
+        Failure::unless((0..2).all(|i| window[0][i] < window[1][i]), why)?;
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
         let part = Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
         let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));
@@ -175,10 +174,9 @@ impl Picture {
 
     /// The picture as an SVG document.
     pub fn svg(&self) -> String {
-        let axes = plane_axes(self.slice.axis);
         let axis = |i: usize| {
             let range = Some((self.window[0][i], self.window[1][i]));
-            Axis { range, ..Axis::linear(["x", "y", "z"][axes[i]]) }
+            Axis { range, ..Axis::linear(["x", "y", "z"][plane_axes(self.slice.axis)[i]]) }
         };
         // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
         let cells = vec![self.window];
