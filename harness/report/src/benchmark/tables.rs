@@ -46,7 +46,6 @@ pub fn causes(groups: &Groups) -> Vec<String> {
 fn experiment(groups: &Groups, name: &str) -> Table {
     let of = groups.all.iter().filter(|g| g.setup.experiment == name);
     let of: Vec<(&Group, Option<Efficiency>)> = of.map(|g| (g, groups.efficiency(g))).collect();
-
     let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
     let of_base = |of: &Group, x: Option<f64>| shown(x.filter(|_| groups.has_reference(of)));
     let table = Table::of(
