@@ -197,8 +197,9 @@ impl<'a> Problem<'a> {
     /// Makes the pilot runs and extrapolates them.
     fn plan(&self, run: Run) -> Result<Plan, Error> {
         let coarsest = self.rules.level_deepest();
-        let are_deepest = self.rules.boxes.iter().all(|b| b.level == coarsest);
         let [rough, rough_boxed] = self.rough;
+        let fine = Vec::from_iter(self.rules.boxes.iter().filter(|b| b.level == coarsest).copied());
+        let part_deepest = boxed_in(&fine, 0, 0) / rough_boxed.max(1.0);
         let rough_at = |s: Level| rough / 4f64.powi(s as i32) + rough_boxed / 8f64.powi(s as i32);
         // Without doubt that the run does not fit, its pilots are short.
         let thick = (f64::from(self.rules.layer_cells_min) / 4.0).clamp(1.0, 16.0);
@@ -216,7 +217,7 @@ impl<'a> Problem<'a> {
                 cells: amounts.cells as u64,
                 time_cpu_s: amounts.time_cpu_s(),
             });
-            let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed, are_deepest };
+            let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed, part_deepest };
             let next = shift - shift.min(1);
             // A pilot also makes the cells in boxes that it deletes.
             let cells = pilot.at(next).cells.max(rough_boxed / 8f64.powi(next as i32));

@@ -84,8 +84,7 @@ fn control_group(groups: &str, mount: &Path) -> f64 {
 /// are in memory alone, which both versions count as cache.
 fn left(folder: &Path) -> f64 {
     let text = |name: &str| read_to_string(folder.join(name)).unwrap_or_default();
-    let number =
-        |names: [&str; 2]| names.iter().find_map(|name| text(name).trim().parse::<f64>().ok());
+    let number = |of: [&str; 2]| of.iter().find_map(|name| text(name).trim().parse::<f64>().ok());
     let stat = text("memory.stat");
     let of_line = |name: &str| stat.lines().find_map(|l| l.strip_prefix(name)?.parse::<f64>().ok());
     let bytes = |names: [&str; 2]| names.into_iter().find_map(of_line).unwrap_or(0.0);
@@ -135,9 +134,8 @@ impl Ranks {
     /// Peak resident memory of each rank, if each takes as many bytes as given beyond what it has. Ranks of one process have equal
     /// parts of it.
     pub fn peaks(&self, more: &[f64]) -> Vec<u64> {
-        let peak = |(rank, more): (&Rank, &f64)| {
-            rank.peak.max(rank.resident + more * self.in_process) / self.in_process
-        };
+        let n = self.in_process;
+        let peak = |(rank, more): (&Rank, &f64)| rank.peak.max(rank.resident + more * n) / n;
         self.all.iter().zip(more).map(|pair| peak(pair) as u64).collect()
     }
 

@@ -6,7 +6,7 @@
 //! overlap, and with slower terms for the far field. Two pilot runs give the first term and one for all others, whose base lies
 //! between 2 and 1 for the slower ones.
 
-use bricks::brick::Brick;
+use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::octant::{Level, corner, edge};
 use bytemuck::{Pod, Zeroable};
@@ -41,11 +41,8 @@ pub struct Amounts {
 impl Amounts {
     /// The sums of several ranks' amounts.
     pub fn sum(of: impl Iterator<Item = Self>) -> Self {
-        let add = |a: [f64; AMOUNTS], b: Self| {
-            let b: [f64; AMOUNTS] = bytemuck::cast(b);
-            std::array::from_fn(|i| a[i] + b[i])
-        };
-        bytemuck::cast(of.fold([0.0; AMOUNTS], add))
+        let all = of.map(bytemuck::cast::<Self, [f64; AMOUNTS]>);
+        bytemuck::cast(all.fold([0.0; AMOUNTS], |a, b| std::array::from_fn(|i| a[i] + b[i])))
     }
 
     /// CPU time of all phases, in seconds.
@@ -107,13 +104,13 @@ pub struct Pilot {
     pub coarser: Option<Amounts>,
     /// Cells in the boxes at the case's own spacing.
     pub cells_boxed: f64,
-    /// Whether no leaf is finer than any box.
-    pub are_deepest: bool,
+    /// The part of them that are in boxes which ask for the finest leaves of the mesh.
+    pub part_deepest: f64,
 }
 
-/// Bytes per cell of a box while sides are decided, if it is kept and if it is deleted: of boxes some of which are coarser than other leaves,
-/// and of those that are not. The set of a level with finer ones has full bricks.
-const BYTES_PER_CELL_BOXED: [[f64; 2]; 2] = [[0.38, 0.36], [0.19, 0.24]];
+/// Bytes per cell of a box while sides are decided, if it is kept and if it is deleted: of boxes that are coarser than some leaves, and of
+/// others. The set of a level with finer ones has full bricks.
+const BYTES_PER_CELL_BOXED: [[f64; 2]; 2] = [[0.38, 0.19], [0.36, 0.24]];
 /// The same in gradation, which makes no deleted ones.
 const BYTES_PER_CELL_GRADED: f64 = 0.05;
 /// A visit of each brick of 64 cells.
@@ -138,7 +135,8 @@ impl Pilot {
         };
         let cells = grown(|a| a.cells, kept);
         let tests = grown(|a| a.tests, self.cells_boxed * TESTS_PER_CELL_BOXED);
-        let [of_kept, of_deleted] = BYTES_PER_CELL_BOXED[usize::from(self.are_deepest)];
+        let mixed = |[other, deepest]: [f64; 2]| other + (deepest - other) * self.part_deepest;
+        let [of_kept, of_deleted] = BYTES_PER_CELL_BOXED.map(mixed);
         Amounts {
             cells,
             tests,
@@ -164,10 +162,15 @@ fn shell_at(further: i32, fine: f64, coarse: Option<f64>) -> f64 {
 /// Deepest level of the octants in which overlapping boxes are distinguished.
 const LEVEL_OVERLAP: Level = 6;
 
+/// The boxes that meet a cube.
+fn near(boxes: &[ExtentBox], min: [i64; 3], h: i64) -> Vec<ExtentBox> {
+    boxes.iter().filter(|b| b.meets(min, h)).copied().collect()
+}
+
 /// The cells that boxes ask for in an octant; where boxes overlap, the finest of them.
 pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
     let (min, h) = (corner(l, code), edge(l));
-    let near: Vec<ExtentBox> = boxes.iter().filter(|b| b.meets(min, h)).copied().collect();
+    let near = near(boxes, min, h);
     let finest = near.iter().map(|b| b.level).max();
     let fills = |b: &ExtentBox| (0..3).all(|a| b.min[a] <= min[a] && min[a] + h <= b.max[a]);
     let is_one = near.iter().any(|b| Some(b.level) == finest && fills(b));
@@ -184,10 +187,13 @@ pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
 
 /// The cells that boxes ask for in deleted leaves that this rank owns.
 fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
-    let of_brick = |l: Level, b: Brick| match b.bits {
-        // A full brick is one octant.
-        u64::MAX => boxed_in(boxes, l - 2, b.key),
-        _ => b.codes().map(|code| boxed_in(boxes, l, code)).sum::<f64>(),
+    let of_brick = |l: Level, b: Brick| {
+        let near = near(boxes, brick::min_corner(l, b.key), 4 * edge(l));
+        match b.bits {
+            // A full brick is one octant.
+            u64::MAX => boxed_in(&near, l - 2, b.key),
+            _ => b.codes().map(|code| boxed_in(&near, l, code)).sum::<f64>(),
+        }
     };
     let bricks_of = |l, deleted| mesh.ownership.owned(l, deleted).map(move |b| of_brick(l, b));
     (0..).zip(mesh.sides.deleted()).flat_map(|(l, deleted)| bricks_of(l, deleted)).sum()
@@ -208,7 +214,7 @@ mod tests {
         };
         let (shift, cells_boxed) = (4, 10e9);
         let (amounts_fine, coarser) = (amounts(4), Some(amounts(5)));
-        let pilot = Pilot { shift, amounts: amounts_fine, coarser, cells_boxed, are_deepest: true };
+        let pilot = Pilot { shift, amounts: amounts_fine, coarser, cells_boxed, part_deepest: 1.0 };
         for shift in 0..4 {
             let error = pilot.at(shift).cells / amounts(shift as i32).cells - 1.0;
             assert!(error.abs() < 1e-9, "{shift}: {error}");
@@ -239,7 +245,7 @@ mod tests {
         for (shift, fine, coarser, cells_boxed, at, expected) in expected {
             let coarser = coarser.map(amounts);
             let amounts = amounts(fine);
-            let pilot = Pilot { shift, amounts, coarser, cells_boxed, are_deepest: true };
+            let pilot = Pilot { shift, amounts, coarser, cells_boxed, part_deepest: 1.0 };
             let found: [f64; AMOUNTS] = bytemuck::cast(pilot.at(at));
             for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
                 let error = (found - expected).abs() / expected.abs().max(1.0);

@@ -218,8 +218,8 @@ fn two_pilot_runs_predict_the_mesh() {
     // These repeat exactly: a change of what is counted shows here.
     assert_eq!(counted(&mesh), [764868.0, 27894.96431997696, 22726.6, 214338.0, 194820.0]);
     assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
-    let (coarser, are_deepest) = (Some(coarse), true);
-    let pilot = Pilot { shift: 1, amounts: fine, coarser, cells_boxed, are_deepest };
+    let (coarser, part_deepest) = (Some(coarse), 1.0);
+    let pilot = Pilot { shift: 1, amounts: fine, coarser, cells_boxed, part_deepest };
     let predicted = pilot.at(0);
     for (name, predicted, measured) in [
         ("cells", predicted.cells, mesh.cells),

@@ -325,7 +325,9 @@ fn ranks_that_were_asked_for_or_promised_require_mpirun() {
 #[test]
 fn processes_that_others_started_are_left_alone() {
     let fixture = Fixture::new();
-    let script = "setsid sleep 600 >/dev/null 2>&1 & echo $! >sleeper; exec \"$@\"";
+    // In a session of its own from some time on.
+    let script =
+        "(sleep 0.05; exec setsid sleep 600) >/dev/null 2>&1 & echo $! >sleeper; exec \"$@\"";
     let verify = "verify case.toml --no-mpi --no-proof --mesher ./mesher --reference ./reference";
     let mut command = Command::new("sh");
     command.args(["-c", script, "sh", env!("CARGO_BIN_EXE_harness")]).args(verify.split(' '));

@@ -3,7 +3,8 @@
 //!
 //! A request is a line on the program's standard input, a JSON array of words. The answer is a line on its standard output: the exit
 //! code that these words would have given a process of their own. Errors are on the standard error. A program that ends or hangs
-//! instead costs that request, and the next one starts it again.
+//! instead costs that request, and the next one starts it again. A second line for one request is found at the next one, which it costs, if
+//! it has arrived by then.
 
 use super::failure::{End, Failure, Result};
 use super::interrupt;
@@ -59,7 +60,9 @@ impl Services {
         if let Some(service) = services.get_mut(name) {
             let ended = service.session.wait(Duration::ZERO).map_err(failure)?;
             let end = match (service.answers.try_recv(), ended) {
-                (Ok(_), _) => Err(End::Unusable("printed more than one line for a run".to_owned())),
+                (Ok(_), _) => {
+                    Err(End::Unusable("printed more than one line for the run before".to_owned()))
+                }
                 (Err(_), None) => return Ok(()),
                 (Err(_), Some((status, _))) => process::judge(status, &service.errors),
             };
@@ -234,7 +237,7 @@ mod tests {
             started = services.start("sh", script);
             started.is_ok()
         });
-        let why = "printed more than one line for a run".to_owned();
+        let why = "printed more than one line for the run before".to_owned();
         assert_eq!(started.unwrap_err().end, End::Unusable(why));
         services.start("sh", script).unwrap();
     }

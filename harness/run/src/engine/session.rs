@@ -26,11 +26,11 @@ const ATTEMPTS: usize = 500;
 static RUNNING: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
 
 /// Children that this process had when it began: what a shell started before it became the harness.
-static INHERITED: OnceLock<Vec<Pid>> = OnceLock::new();
+static INHERITED: OnceLock<Vec<i32>> = OnceLock::new();
 
-/// Leaves the children alone that there are by now.
+/// Leaves the children alone that there are by now, and their sessions.
 pub(super) fn keep_children() {
-    INHERITED.get_or_init(|| adopted(&[]));
+    INHERITED.get_or_init(children);
 }
 
 fn running() -> MutexGuard<'static, Vec<Pid>> {
@@ -171,15 +171,23 @@ fn members(leader: Pid) -> Vec<Pid> {
 }
 
 fn adopted(kept: &[Pid]) -> Vec<Pid> {
+    let (own, inherited) = (session(0), INHERITED.get().map_or(&[][..], Vec::as_slice));
+    let is_ours = |&child: &i32| {
+        let session = session(child);
+        session != own && !inherited.contains(&child) && !inherited.contains(&session)
+    };
+    let ours = children().into_iter().filter(is_ours).filter_map(Pid::from_raw);
+    ours.filter(|child| !kept.contains(child)).collect()
+}
+
+/// The children of this process.
+fn children() -> Vec<i32> {
     let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    let children = threads.flat_map(|thread| {
+    let of_thread = |thread: fs::DirEntry| {
         let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
         text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<i32>>()
-    });
-    let own = session(0);
-    let others = children.filter(|&child| session(child) != own).filter_map(Pid::from_raw);
-    let inherited = INHERITED.get().map_or(&[][..], Vec::as_slice);
-    others.filter(|child| !kept.contains(child) && !inherited.contains(child)).collect()
+    };
+    threads.flat_map(of_thread).collect()
 }
 
 /// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container,
