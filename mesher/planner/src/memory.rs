@@ -124,11 +124,8 @@ impl Ranks {
     /// Bytes that each rank takes beyond what it has, for a mesh that takes `amounts` on all ranks.
     pub fn growth(&self, amounts: &Amounts) -> Vec<f64> {
         let factor = amounts.bytes() / self.total().bytes().max(1.0) - 1.0;
-        let of_rank = |rank: &Rank| {
-            let sets = (rank.amounts.bytes() * factor).max(0.0);
-            sets + (HOLES[0] * sets).min(HOLES[1])
-        };
-        self.all.iter().map(of_rank).collect()
+        let sets = self.all.iter().map(|rank| (rank.amounts.bytes() * factor).max(0.0));
+        sets.map(|sets| sets + (HOLES[0] * sets).min(HOLES[1])).collect()
     }
 
     /// Peak resident memory of each rank, if each takes as many bytes as given beyond what it has. Ranks of one process have equal

@@ -36,6 +36,11 @@ pub struct Slice {
     pub total: u64,
 }
 
+/// The name of a source, for errors.
+fn name(source: &Source) -> &Path {
+    if let Source::Stl(path) = source { path } else { Path::new("facets") }
+}
+
 /// Reads this rank's slice. Collective.
 ///
 /// # Errors
@@ -57,7 +62,7 @@ pub fn read(source: &Source, comm: &dyn Comm) -> Result<Slice, Error> {
         Source::Generated(g) => distribute(comm, || g.facets().map_err(Error::input))?,
         Source::Given(facets) => distribute(comm, || Ok(facets.clone()))?,
     };
-    agree(comm, stl::check_finite(&slice.facets, slice.first))?;
+    agree(comm, stl::check_finite(&slice.facets, slice.first).map_err(|e| e.at(name(source))))?;
     Ok(slice)
 }
 
@@ -96,18 +101,17 @@ fn distribute(
 /// # Errors
 /// Names the first rank with another one than rank 0.
 fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
-    let (name, other) = uncounted(comm, || match source {
+    let other = uncounted(comm, || match source {
         // Copies on several machines differ in their times only.
         Source::Stl(path) => {
-            let other = first_other(comm, &identity(path));
-            (path.as_path(), other.and_then(|_| first_other(comm, &content(path))))
+            first_other(comm, &identity(path)).and_then(|_| first_other(comm, &content(path)))
         }
-        Source::Generated(_) => (Path::new(""), None),
-        Source::Given(all) => (Path::new("facets"), first_other(comm, &cast_slice::<_, u8>(all))),
+        Source::Generated(_) => None,
+        Source::Given(all) => first_other(comm, &cast_slice::<_, u8>(all)),
     });
     let Some(rank) = other else { return Ok(()) };
     let why = "has another geometry than rank 0: start all ranks with the same files or facets";
-    Err(Error::input(format!("rank {rank} {why}")).at(name))
+    Err(Error::input(format!("rank {rank} {why}")).at(name(source)))
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.

@@ -73,7 +73,7 @@ fn files_that_are_not_stl_are_refused() {
         workspace.write(&name, bytes);
         let what: &[&str] = match name.as_str() {
             "empty.stl" => &["empty"],
-            "nan.stl" | "infinite.stl" => &["facet 6", "not finite"],
+            "nan.stl" | "infinite.stl" => &[".stl: facet 6", "not finite"],
             "ascii_nan.stl" | "ascii_infinite.stl" | "ascii_overflow.stl" => {
                 &[&name, "facet 6", "finite"]
             }
