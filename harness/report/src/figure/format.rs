@@ -32,6 +32,7 @@ pub fn format_of(path: &Path) -> Result<Format, String> {
 #[cfg(feature = "figures")]
 pub(super) mod rendered {
     use crate::figure::canvas::FONT;
+    use regex::bytes::{Captures, Regex};
     use resvg::{tiny_skia, usvg};
     use std::sync::Arc;
 
@@ -56,6 +57,15 @@ pub(super) mod rendered {
 
     pub fn pdf(svg: &str) -> Result<Vec<u8>, String> {
         let (conversion, page) = Default::default();
-        svg2pdf::to_pdf(&tree(svg)?, conversion, page).map_err(|error| error.to_string())
+        let made = svg2pdf::to_pdf(&tree(svg)?, conversion, page);
+        // The resources of a page have a random order. Those of one kind are lines in sequence, which keep their length.
+        let resources = Regex::new(r"(?m-u)(?:^ +/[a-z]+[0-9]+ [0-9]+ 0 R\n)+").expect("constant");
+        let sorted = |found: &Captures| {
+            let mut lines: Vec<&[u8]> = found[0].split_inclusive(|byte| *byte == b'\n').collect();
+            lines.sort_unstable();
+            lines.concat()
+        };
+        made.map(|pdf| resources.replace_all(&pdf, sorted).into())
+            .map_err(|error| error.to_string())
     }
 }

@@ -6,6 +6,7 @@ use super::svg::svg;
 use super::{Axis, Figure, Point, Provenance};
 use resvg::tiny_skia::Rect;
 use resvg::usvg::{Group, Node};
+use std::collections::BTreeSet;
 
 fn texts(group: &Group, found: &mut Vec<(String, Rect)>) {
     for node in group.children() {
@@ -52,6 +53,17 @@ fn png_and_pdf_contain_the_text() {
     let page = pdf(&drawn).unwrap();
     assert!(page.starts_with(b"%PDF"));
     assert!(page.windows(10).any(|w| w == b"DejaVuSans"), "the typeface is in the file");
+}
+
+/// A figure in a repository changes only with its data. Transparent areas, of which this one has four, are resources of the page.
+#[test]
+fn a_pdf_has_the_same_bytes_whenever_it_is_made() {
+    let drawn = svg(&figure(vec![series(Provenance::Modelled); 4]));
+    let made: BTreeSet<Vec<u8>> = (0..8).map(|_| pdf(&drawn).unwrap()).collect();
+    assert_eq!(made.len(), 1);
+    let page = String::from_utf8_lossy(made.first().unwrap()).into_owned();
+    let (at, lines) = (page.find("/gs0 ").unwrap(), ["/gs1 ", "/gs2 ", "/gs3 "]);
+    assert!(lines.map(|of| page.find(of)).is_sorted() && page.find(lines[0]) > Some(at), "{page}");
 }
 
 /// Names in the legend as long as a page, numbers of many digits, a single value.
