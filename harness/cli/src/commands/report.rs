@@ -58,22 +58,25 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 /// Reads a text and those that it includes, without figures of reports, and without the numbers that the report in `directory` has just
-/// written. Also returns whether a figure is that of an earlier report.
+/// written. Also returns whether a figure is that of an earlier report, or a text is not found because no text defines its directory.
 fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)> {
     let own = directory.join("numbers.tex").canonicalize().ok();
     let (mut paths, mut all, mut next, mut is_old) = (vec![main.to_owned()], Vec::new(), 0, false);
+    // A directory may be defined in another text than the one that uses it.
+    let mut whole = String::new();
     while let Some(path) = paths.get(next).cloned() {
         next += 1;
         // Numbers and commands are the same in any encoding that LaTeX reads.
         let bytes = files::read(&path).map_err(|error| Failure::at(&path, error))?;
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        let is_figure = |line| line == r"\providecommand{\figures}{figures}";
-        let is_figure = text.lines().take(3).any(is_figure);
+        let head = r"\providecommand{\figures}{figures}";
+        let is_figure = text.lines().take(3).any(|line| line == head);
         is_old |= is_figure && is_outdated(&path, &text, directory)?;
         if is_figure || path.canonicalize().ok() == own {
             continue;
         }
-        for name in included(&text) {
+        whole += &(text.clone() + "\n");
+        for name in included(&whole)[0].iter().filter(|name| !name.starts_with('\\')) {
             // As LaTeX does: relative to the main text, whichever includes it.
             let [named, tex] = ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
             let file = if named.is_file() || name.ends_with(".tex") { named } else { tex };
@@ -83,7 +86,26 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
         }
         all.push((path, text));
     }
+    let [texts, pictures] = included(&whole);
+    let unknown = texts.iter().filter(|name| name.starts_with('\\'));
+    let why = "is not compared: no text defines its directory with \\newcommand";
+    is_old |= unknown.inspect(|name| println!("{name} {why}")).count() > 0;
+    for name in pictures.iter().flat_map(|name| ["", ".pdf", ".png"].map(|end| name.clone() + end))
+    {
+        let copy = main.with_file_name(name);
+        let made = directory.join("figures").join(copy.file_name().unwrap_or_default());
+        is_old |= differs(&copy, &made)?;
+    }
     Ok((all, is_old))
+}
+
+/// Whether a file differs from that of the report, if both are there; prints it.
+fn differs(copy: &Path, made: &Path) -> Result<bool> {
+    let differs = copy.is_file() && made.is_file() && fs::read(copy)? != fs::read(made)?;
+    if differs {
+        println!("{}: differs from that of the report: copy it again", copy.display());
+    }
+    Ok(differs)
 }
 
 /// Whether a figure, unless it is a list of them, is none of the report's in `directory`, or files beside it, or below a list, differ from
@@ -100,10 +122,7 @@ fn is_outdated(figure: &Path, text: &str, directory: &Path) -> Result<bool> {
         let is_read = made.extension().is_some_and(|of| of == "tex" || of == "csv");
         for of in ["", "figures"] {
             let copy = figure.with_file_name(of).join(made.file_name().unwrap_or_default());
-            if is_read && copy.is_file() && fs::read(&copy)? != fs::read(&made)? {
-                println!("{}: differs from that of the report: copy it again", copy.display());
-                is_outdated = true;
-            }
+            is_outdated |= is_read && differs(&copy, &made)?;
         }
     }
     Ok(is_outdated)
@@ -165,4 +184,51 @@ pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>> {
     }
     found.sort();
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIGURE: &str = "% Requires x\n\\providecommand{\\figures}{figures}\n";
+
+    /// The texts of a paper that are read, beside a copy of a report's figures, one of which is another.
+    fn read_of(paper: &str, changed: &str) -> (usize, bool) {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let put = |name: &str, text: &str| {
+            fs::create_dir_all(at(name).parent().unwrap()).unwrap();
+            fs::write(at(name), text).unwrap();
+        };
+        put("report/figures.tex", r"% Made by \input{\figures/a.tex}");
+        for name in ["a.tex", "a.csv", "b.pdf"] {
+            put(&format!("report/figures/{name}"), FIGURE);
+            put(&format!("of paper/{name}"), FIGURE);
+        }
+        put(&format!("of paper/{changed}"), &format!("{FIGURE}%"));
+        put("head.tex", r"\newcommand{\here}{of paper}");
+        put("paper.tex", paper);
+        let (texts, is_old) = texts(&at("paper.tex"), &at("report")).unwrap();
+        (texts.len(), is_old)
+    }
+
+    #[test]
+    fn figures_of_an_earlier_report_are_found_however_a_text_includes_them() {
+        let by_path = r"\input{of paper/a}\input{head}";
+        let by_macro = r"\input{\here/a}\input{head}";
+        for paper in [by_path, by_macro] {
+            assert_eq!(read_of(paper, "other"), (2, false));
+            for changed in ["a.csv", "a.tex"] {
+                assert_eq!(read_of(paper, changed), (2, true), "{paper} {changed}");
+            }
+        }
+        for picture in
+            [r"\includegraphics[width=1cm]{of paper/b}", r"\includegraphics{of paper/b.pdf}"]
+        {
+            assert_eq!(read_of(picture, "a.csv"), (1, false));
+            assert_eq!(read_of(picture, "b.pdf"), (1, true), "{picture}");
+        }
+        // One that is not found is none that agrees.
+        assert_eq!(read_of(r"\input{\there/a}", "other"), (1, true));
+    }
 }

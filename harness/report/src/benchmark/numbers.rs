@@ -102,13 +102,15 @@ pub fn tex(numbers: &[Number]) -> String {
     out
 }
 
-/// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths. A bracket after
-/// the first commands begins an interval or a short title. Before a word, `in` is one as well.
-const NOT_READ: [&str; 5] = [
+/// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, colours, factors of the
+/// layout, lengths. A bracket after the first commands begins an interval or a short title. Options over several lines have an equals sign.
+/// Before a word, `in` is one as well.
+const NOT_READ: [&str; 6] = [
     r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
-    r"\\(?:[a-zA-Z]*(?:label|ref|cite|input|url)|include|result|includegraphics|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
-    r"\\[a-zA-Z]+\*?\[[^\]\n]*\]|[}\]]\[[^\]\n]*[a-zA-Z!][^\]\n]*\]",
-    r"\\definecolor\s*(?:\{[^}]*\}\s*){3}",
+    r"\\(?:[a-zA-Z]*(?:label|ref|cite[a-z]*|input|url)|include|result|includegraphics|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\]\s*)*\{[^}]*\}",
+    r"\\(?:definecolor\s*(?:\{[^}]*\}\s*){3}|[a-zA-Z]*color\s*\[[^\]]*\]\s*\{[^}]*\})",
+    r"\\(?:(?:(?:re)?newcommand|def)\*?\s*\{?\s*\\(?:arraystretch|baselinestretch)\s*\}?|linespread|scalebox)\s*\{[^}]*\}",
+    r"(?:\\[a-zA-Z]+\*?|[}\]])\[\s*[a-zA-Z][^\[\]=]*=[^\[\]]*\]|\\[a-zA-Z]+\*?\[[^\]\n]*\]|[}\]]\[[^\]\n]*[a-zA-Z!][^\]\n]*\]",
     r"[0-9.]+(?:[ \t]*(?:pt|cm|mm|em|ex|bp)\b|in(?:[ \t]*[^a-zA-Z \t]|$)|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
 
@@ -163,13 +165,25 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
 /// How a text includes another. The directory of `\import` has its slash.
 const INCLUDED: &str = r#"\\(?:(?:sub)?import\s*\{\s*([^}]*?)\s*\}\s*\{\s*([^}]*?)\s*\}|(?:input|include|subfile)(?:\s*\{\s*"?([^}"]*?)"?\s*\}|[ \t]+"?([^\s\\{}"]+)))"#;
 
-/// The texts that a text includes, as it names them, without the figures of a report.
-pub fn included(text: &str) -> Vec<String> {
+/// How it includes a picture.
+const PICTURED: &str = r"\\includegraphics\*?\s*(?:\[[^\]]*\]\s*)*\{\s*([^}]*?)\s*\}";
+
+/// A macro that stands for a directory.
+const DEFINED: &str = r"\\(?:[a-z]+command\*?|def)\s*\{?\s*(\\[a-zA-Z]+)\s*\}?\s*\{([^{}\\#]*)\}";
+
+/// The texts and the pictures that a text includes, as it names them, with the directories for which it has macros; without those that an
+/// argument of a macro names in such a directory.
+pub fn included(text: &str) -> [Vec<String>; 2] {
     let code = without_comments(text);
-    let name = |of: Captures| of.iter().skip(1).flatten().map(|m| m.as_str()).collect();
-    let uses = pattern(INCLUDED);
-    let names = uses.captures_iter(&code).map(name);
-    names.filter(|name: &String| !name.starts_with(r"\figures/")).collect()
+    let [defined, texts, pictures] = [DEFINED, INCLUDED, PICTURED].map(pattern);
+    let value = |of: Captures| [1, 2].map(|part| format!("{}/", &of[part]));
+    let defined: Vec<[String; 2]> = defined.captures_iter(&code).map(value).collect();
+    let name = |of: Captures| -> Option<String> {
+        let name: String = of.iter().skip(1).flatten().map(|m| m.as_str()).collect();
+        let is_fixed = !(name.starts_with('\\') && name.contains('#'));
+        is_fixed.then(|| defined.iter().fold(name, |name, [from, to]| name.replace(from, to)))
+    };
+    [texts, pictures].map(|of| of.captures_iter(&code).filter_map(name).collect())
 }
 
 /// In an address, `%` begins no comment.
@@ -287,7 +301,16 @@ mod tests {
     fn included_texts_are_found() {
         let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}\\input g.tex\n\
                     \\subfile{h}\\import{i/}{j}\\subimport{k/}{l.tex}\\input{\"m n/o\"}\\inputlineno{p}";
-        assert_eq!(included(text), ["a", "c.tex", "e", "g.tex", "h", "i/j", "k/l.tex", "m n/o"]);
+        let [texts, pictures] = included(text);
+        let expected = ["a", "c.tex", "e", r"\figures/f", "g.tex", "h", "i/j", "k/l.tex", "m n/o"];
+        assert_eq!(texts, expected);
+        assert_eq!(pictures, ["d"]);
+        for defined in [r"\newcommand{\of}{x/y}", r"\renewcommand*\of{x/y}", r"\def \of {x/y}"] {
+            let uses = r"\input{\of/a}\input{\offset/b}\includegraphics[width=9cm,\n scale=2]{\of/c.pdf}\newcommand\D[1]{\input{\of/#1}}";
+            let [texts, pictures] = included(&format!("{defined}{uses}"));
+            assert_eq!(texts, ["x/y/a", r"\offset/b"]);
+            assert_eq!(pictures, ["x/y/c.pdf"]);
+        }
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {
@@ -308,6 +331,9 @@ mod tests {
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\\\\[1.25in] \\vskip 1.25in\n\\href{http://x/1.999%20b}{b}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
         assert_eq!(check(right, &record), Checked { compared: 12, by_hand: 9, findings: vec![] });
+        let layout = "\\citep[see][Table 3.129]{x} \\cite [a] [b 3.129] {x} \\textcolor[rgb]{0.1,0.255,0.355}{a} \\rowcolor [gray] {0.905} \\def\\baselinestretch{1.255}\n\
+                      \\begin{axis}[width=9cm, x=1.555,\n y=1.255]\\foo[thick,\n scale = 1.255] \\renewcommand{\\arraystretch}{1.255}\\linespread{1.255}\\scalebox{0.555}{a}";
+        assert_eq!(check(layout, &record), Checked::default());
         let efficiency = [Number { unit: "", ..number("a/efficiency", "0.708", "") }];
         let right = "\\newcommand{\\T}[1]{\\result{a/#1/time}}\\definecolor{c}{rgb}{0.123,0.456,0.789} \\hspace*{9.89 cm} 70.8\\,\\%, 70.8~\\% and 0.708";
         assert_eq!(
@@ -342,6 +368,11 @@ mod tests {
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
             ("\\url{http://x/a%20b} 9.87", "9.87 is written by hand"),
             ("\\caption[short 9.87]{a}", "9.87 is written by hand"),
+            ("\\caption[n = 3,\n9.87]{a}", "9.87 is written by hand"),
+            ("\\textcolor[rgb]{1,0,0}{9.87}", "9.87 is written by hand"),
+            ("\\scalebox{0.555}{9.87}", "9.87 is written by hand"),
+            ("\\newcommand{\\a}{9.87}", "9.87 is written by hand"),
+            ("\\cite{a} [9.87,\n1.23] = [b]", "9.87 is written by hand"),
             ("\\subsection*[9.87]{a}", "9.87 is written by hand"),
             ("9.87exactly", "9.87 is written by hand"),
             ("9.87in total", "9.87 is written by hand"),
