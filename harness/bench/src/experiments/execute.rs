@@ -105,9 +105,9 @@ impl Runner<'_> {
     }
 }
 
-/// Returns the reason for which a run would exceed `limit` or the memory of the machine, extrapolated from the finest coarser
-/// mesh of the same program; `None` if it would not, or if the lines have no such mesh.
-pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<String> {
+/// Returns the reason for which a run would exceed a time or the memory of its machine, or on MPI of so many, extrapolated from the
+/// finest coarser mesh of the same program; `None` if it would not, or if the lines have no such mesh.
+pub(crate) fn excess(lines: &[Line], setup: &Setup, most: (Duration, usize)) -> Option<String> {
     let is_coarser = |run: &&Run| {
         let [wanted, found] =
             [setup, &run.setup].map(|s| (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm));
@@ -119,8 +119,8 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
     // Cells, and with them time and memory, grow with the inverse square of the spacing.
     let growth = (finest.setup.spacing_min / setup.spacing_min).powi(2);
     let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
-    let memory =
-        lines.iter().find_map(Line::session)?.machine.memory_bytes as f64 * node_count() as f64;
+    let (limit, nodes) = (most.0, if setup.comm == Comm::Mpi { most.1 } else { 1 });
+    let memory = lines.iter().find_map(Line::session)?.machine.memory_bytes as f64 * nodes as f64;
     let [need, there] = [bytes, memory].map(|b| b / 1e9);
     let would = match () {
         () if time_s > limit.as_secs_f64() => {
@@ -391,7 +391,7 @@ mod tests {
         };
         let finer = |lines: &[Line], spacing_min: f64, limit: u64| {
             let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
-            excess(lines, &Setup { spacing_min, ..setup }, Duration::from_secs(limit))
+            excess(lines, &Setup { spacing_min, ..setup }, (Duration::from_secs(limit), 9999))
         };
         let (small, large) = (of(1e6), of(1e13));
         assert_eq!(finer(&small, 0.01, 300), None);
@@ -399,5 +399,12 @@ mod tests {
         assert!(finer(&large, 0.05, 300).unwrap().contains("need 40000 GB of memory"));
         // The same spacing is no coarser mesh.
         assert_eq!(finer(&large, 0.1, 1), None);
+        // Ranks on MPI have the memory of all nodes.
+        let mut on_mpi = large.clone();
+        let Entry::Run(run) = &mut on_mpi[1].entry else { panic!("a run") };
+        run.setup.comm = Comm::Mpi;
+        let finer = Setup { spacing_min: 0.05, ..run.setup.clone() };
+        let on = |nodes| excess(&on_mpi, &finer, (Duration::from_secs(300), nodes));
+        assert!(on(9999).is_none() && on(2).unwrap().contains("and there are 17 GB"));
     }
 }

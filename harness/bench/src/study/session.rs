@@ -18,7 +18,7 @@ use clap::Args;
 use contract::case::Case;
 use contract::failure::{Failure, Result, uninterrupted};
 use run::engine::interrupt;
-use run::engine::layout::Launcher;
+use run::engine::layout::{Launcher, node_count};
 use run::engine::runner::Programs;
 use run::verify::options::whole_seconds;
 use std::collections::{BTreeMap, BTreeSet};
@@ -350,7 +350,8 @@ impl Session<'_> {
             let (is_declined, layout) = (declined.is_some(), (setup.ranks, setup.comm));
             let is_one_mesh = engine.promises.is_independent_of(Independence::Ranks);
             let warm = (mesh.clone(), (!is_one_mesh).then_some(setup.ranks));
-            match declined.or_else(|| excess(&self.lines, &setup, self.runner.limit)) {
+            let most = (self.runner.limit, node_count());
+            match declined.or_else(|| excess(&self.lines, &setup, most)) {
                 Some(why) => {
                     // What takes too long on one rank may not on two.
                     let is_left = |p: &&mut Planned| {
