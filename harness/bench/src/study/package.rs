@@ -72,13 +72,14 @@ pub fn require_made(study: &Study, lines: &[Line], paths: &Paths) -> Result<Vec<
     let last = of_last_origin(lines);
     let of_run = |run: &Run| {
         let (case, ..) = study.source(&run.setup).expect("the study asks for it");
-        (case, run.inputs.clone())
+        (case, run.setup.experiment.clone(), run.inputs.clone())
     };
-    for (case, inputs) in last.iter().filter_map(Line::run).map(of_run).collect::<BTreeSet<_>>() {
+    let made: BTreeSet<_> = last.iter().filter_map(Line::run).map(of_run).collect();
+    for (case, experiment, inputs) in made {
         let path = paths.catalogue.case_file(case, &study.directory)?;
         let base = Base::read(&path, None, place.path())?;
-        let why = "rules or geometry are not those of the record's runs";
-        Failure::unless(base.inputs == inputs, format!("{case}: {why}"))?;
+        let why = format!("{case}: runs of {experiment} have other rules or geometry: repeat them");
+        Failure::unless(base.inputs == inputs, why)?;
     }
     for name in study.engines().iter().filter(|name| name.ends_with(".toml")) {
         let Ok(engine) = Engine::find(name, None, paths) else { continue };

@@ -50,7 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let lines = read(&records)?;
     let mut expected = Expected::of(&lines)?;
     let paths = Paths::find();
-    expected.missing.extend(require_made(&Study::read(study)?, &lines, &paths)?);
+    let asked = Study::read(study)?;
+    expected.missing.extend(require_made(&asked, &lines, &paths)?);
     let wrong = |error| Failure::at(out, error);
     let staging = Staging::beside(out).map_err(wrong)?;
     let place = staging.path();
@@ -82,6 +83,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let (values, files) = (expected.values.iter().filter(is_compared).count(), members.len() + 1);
     println!("{}: {files} files, {values} values to be met by a replay", out.display());
     expected.missing.iter().for_each(|why| println!("{why}"));
+    let engines = asked.engines().into_iter().filter(|name| name.ends_with(".toml"));
+    let why = "what the scripts beside it import is not in the archive, unless a command names it";
+    engines.for_each(|name| println!("{name}: {why}"));
     Ok(if expected.missing.is_empty() { EXIT_HOLDS } else { EXIT_MISSING })
 }
 

@@ -251,7 +251,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",
         _ if rows.iter().any(is_open) => "a target has no value, and its row says why",
-        _ if has_series && runs.is_empty() => "no series was measured: request fewer cells",
+        _ if has_series && runs.is_empty() => "no series of the study has a run",
         Some(of) => &format!("nothing was measured of {}: the report says why", of.join(", ")),
         None => return EXIT_HOLDS,
     };

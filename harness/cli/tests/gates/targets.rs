@@ -152,7 +152,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let case = fs::read_to_string(fixture.path("case.toml")).unwrap();
     fixture.write("case.toml", &format!("enclosed = 'keep'\n{case}"));
     let changed = fixture.harness(&archive.replace("-o a", "-o c"));
-    let why = "case.toml: rules or geometry are not those of the record's runs";
+    let why = "case.toml: runs of targets have other rules or geometry";
     assert!(changed.code == 2 && changed.printed.contains(why), "{}", changed.printed);
     fixture.write("case.toml", &case);
     let metadata = fs::read_to_string(fixture.path("a/ro-crate-metadata.json")).unwrap();
@@ -247,6 +247,7 @@ fn the_last_build_and_the_last_network_are_those_of_an_archive() {
     let archive = fixture.harness("archive out study.toml -o a --title T --author A --licence MIT");
     let lacks = "engine case strong n=1 sim:1 default is not in the record";
     assert!(archive.code == 3 && archive.printed.contains(lacks), "{}", archive.printed);
+    assert!(archive.printed.contains("engine.toml: what the scripts beside it import is not"));
     // What cannot be run here has its own reason.
     fixture.write("a/study/engine.toml", "serial = 1");
     let expected = fs::read_to_string(fixture.path("a/expected.json")).unwrap();
