@@ -19,7 +19,7 @@ pub use uses::{
     register_output,
 };
 
-use std::fmt::{Display, Write};
+use std::fmt::Display;
 
 /// Exit code of a program with a bug: it panicked.
 pub const BUG: i32 = 70;
@@ -27,21 +27,20 @@ pub const BUG: i32 = 70;
 /// Greatest length of a message in characters: about a screen.
 const SCREEN: usize = 1600;
 
-/// Text that others have written, without the control characters that move the cursor or worse: all but ends of lines and tabs.
+/// Text that others have written, without the characters that move the cursor, turn the direction of a line or worse: of control characters,
+/// only ends of lines and tabs remain.
 pub fn plain(text: &dyn Display) -> String {
-    let is_shown = |c: &char| !c.is_control() || *c == '\n' || *c == '\t';
-    text.to_string().chars().map(|c| if is_shown(&c) { c } else { '\u{fffd}' }).collect()
+    let turns = |c| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let hides = |c: char| turns(c) || c.is_control() && c != '\n' && c != '\t';
+    text.to_string().replace(hides, "\u{fffd}")
 }
 
 /// A message without control characters, of at most a screen.
 pub fn message(text: &dyn Display) -> String {
-    let mut text = plain(text);
-    if let Some((end, _)) = text.char_indices().nth(SCREEN) {
-        let rest = text[end..].chars().count();
-        text.truncate(end);
-        let _ = write!(text, " ... ({rest} characters more)");
-    }
-    text
+    let text = plain(text);
+    let Some((end, _)) = text.char_indices().nth(SCREEN) else { return text };
+    let (shown, rest) = text.split_at(end);
+    format!("{shown} ... ({} characters more)", rest.chars().count())
 }
 
 #[cfg(test)]
@@ -53,6 +52,9 @@ mod tests {
         let (escape, next_line) = ("\x1b[2J\r\x07", "\u{9b}");
         let text = message(&format_args!("a{escape}b\tc\n{next_line}ä"));
         assert_eq!(text, "a\u{fffd}[2J\u{fffd}\u{fffd}b\tc\n\u{fffd}ä");
+        // From here on, a terminal would show a line from right to left.
+        let [turned, isolated] = ["lts.\u{202e}exe", "a\u{2067}b\u{2069}"].map(|text| plain(&text));
+        assert_eq!([turned, isolated], ["lts.\u{fffd}exe", "a\u{fffd}b\u{fffd}"]);
     }
 
     #[test]

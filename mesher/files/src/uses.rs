@@ -118,8 +118,9 @@ pub fn register_output(path: &Path) -> io::Result<()> {
 /// Notes that an option names this file or directory as an output. Once per option.
 ///
 /// # Errors
-/// If another option names it, a directory that contains it, or something in it.
+/// If it is an input of this run, or another option names it, a directory that contains it, or something in it.
 pub fn name_output(path: &Path) -> io::Result<()> {
+    register_output(path)?;
     // Streams and devices take the output of several options.
     if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return Ok(());
@@ -134,9 +135,8 @@ pub fn name_output(path: &Path) -> io::Result<()> {
     let place = place.unwrap_or_else(|| absolute.clone());
     let clashes = |other: &&PathBuf| place.starts_with(other) || other.starts_with(&place);
     let mut uses = uses();
-    if let Some(other) = uses.outputs.iter().find(clashes) {
-        let why =
-            format!("this run also writes {}: give one of them another name", other.display());
+    if let Some(other) = uses.outputs.iter().find(clashes).map(|other| other.display()) {
+        let why = format!("this run also writes {other}: give one of them another name");
         return Err(io::Error::new(ErrorKind::InvalidInput, why));
     }
     uses.outputs.push(place);
@@ -245,6 +245,9 @@ mod tests {
         for free in ["other", "mesh.json", "meshes", "run.json2", "/dev/null", "/dev/null"] {
             name_output(&at(free)).unwrap();
         }
+        fs::write(at("body.stl"), "solid").unwrap();
+        open(&at("body.stl")).unwrap();
+        assert_eq!(name_output(&at("body.stl")).unwrap_err().kind(), ErrorKind::InvalidInput);
         name_output(&at("missing/mesh")).unwrap();
         assert!(name_output(&at("missing/mesh/run.json")).is_err());
     }

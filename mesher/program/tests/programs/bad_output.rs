@@ -25,6 +25,7 @@ fn unwritable_output_is_refused() {
         refused(&workspace, &to("--out", path), OUTPUT, words);
     }
     refused(&workspace, &to("--out", "full"), INPUT, &["full", "not empty", "--out"]);
+    refused(&workspace, &to("--out", "body.stl"), INPUT, &["body.stl", "another name"]);
     for path in ["file/run.json", "absent/run.json", "/proc/run.json", "folder"] {
         refused(&workspace, &to("--json", path), OUTPUT, &[path, "--json"]);
     }
