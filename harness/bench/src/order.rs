@@ -55,8 +55,8 @@ impl Origins {
                 let origin = if origin.is_empty() { "unknown" } else { origin };
                 format!("[{}]: {origin}", i + 1)
             };
-            let all: Vec<String> = seen.iter().enumerate().map(label).collect();
-            format!("series of different origins are apart: {name} {}", all.join("; "))
+            let all = seen.iter().enumerate().map(label).collect::<Vec<_>>().join("; ");
+            format!("the first origin keeps the name, and other series are apart: {name} {all}")
         };
         several.map(sentence).collect()
     }
@@ -82,6 +82,7 @@ mod tests {
         let described = origins.described();
         assert!(
             described.len() == 1
+                && described[0].contains("the first origin keeps the name")
                 && described[0].contains("mesher [1]: x; [2]: y; [3]: unknown; [4]: z")
         );
     }
