@@ -28,13 +28,13 @@ pub type Member = (String, u64);
 #[derive(Clone, Debug, clap::Args)]
 pub struct About {
     /// Title of the archive
-    #[arg(long)]
+    #[arg(long, value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub title: String,
     /// Whoever made it
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub author: String,
     /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
-    #[arg(long, value_name = "SPDX|URL")]
+    #[arg(long, value_name = "SPDX|URL", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub licence: String,
     /// The day, such as `2026-01-31`
     #[arg(skip = now_utc()[.."2026-01-31".len()].to_owned())]

@@ -57,10 +57,10 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     Ok(code)
 }
 
-/// Reads a text and those that it includes, without figures of reports, and without the numbers that the report in `directory` has just
-/// written. Also returns whether a figure is that of an earlier report, or a text is not found because no text defines its directory.
+/// Reads a text and those that it includes, without figures of reports, and without what the report in `directory` has just written.
+/// Also returns whether a figure is that of an earlier report, or a text is not found because no text defines its directory.
 fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)> {
-    let own = directory.join("numbers.tex").canonicalize().ok();
+    let own = ["numbers.tex", "models.tex"].map(|name| fs::read(directory.join(name)).ok());
     let (mut paths, mut all, mut next, mut is_old) = (vec![main.to_owned()], Vec::new(), 0, false);
     // A directory may be defined in another text than the one that uses it.
     let mut whole = String::new();
@@ -72,7 +72,7 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
         let head = r"\providecommand{\figures}{figures}";
         let is_figure = text.lines().take(3).any(|line| line == head);
         is_old |= is_figure && is_outdated(&path, &text, directory)?;
-        if is_figure || path.canonicalize().ok() == own {
+        if is_figure || own.contains(&Some(bytes)) {
             continue;
         }
         whole += &(text.clone() + "\n");
@@ -206,6 +206,9 @@ mod tests {
             put(&format!("of paper/{name}"), FIGURE);
         }
         put(&format!("of paper/{changed}"), &format!("{FIGURE}%"));
+        put("report/models.tex", "98.76543");
+        put("of paper/models.tex", "98.76543");
+        put("of paper/old.tex", "98.76542");
         put("head.tex", r"\newcommand{\here}{of paper}");
         put("paper.tex", paper);
         let (texts, is_old) = texts(&at("paper.tex"), &at("report")).unwrap();
@@ -228,6 +231,9 @@ mod tests {
             assert_eq!(read_of(picture, "a.csv"), (1, false));
             assert_eq!(read_of(picture, "b.pdf"), (1, true), "{picture}");
         }
+        // A copy of what the report has just written has nothing to compare; an older one has.
+        assert_eq!(read_of(r"\input{of paper/models}", "other"), (1, false));
+        assert_eq!(read_of(r"\input{of paper/old}", "other"), (2, false));
         // One that is not found is none that agrees.
         assert_eq!(read_of(r"\input{\there/a}", "other"), (1, true));
     }

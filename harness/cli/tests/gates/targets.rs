@@ -144,6 +144,8 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let archive = "archive out mine.toml -o a --title T --author A --licence MIT";
     let inside = fixture.harness(&archive.replace("-o a", "-o out/a"));
     assert!(inside.code == 2 && inside.printed.contains("is in the report"), "{}", inside.printed);
+    let nameless = fixture.harness(&archive.replace("--title T", "--title="));
+    assert!(nameless.code == 2 && nameless.printed.contains("--title"), "{}", nameless.printed);
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert!(made.printed.contains(" 3 values to be met"), "{}", made.printed);
