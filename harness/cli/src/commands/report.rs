@@ -18,8 +18,8 @@ pub struct Arguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
-    /// Compare the numbers of this LaTeX text, and of those that it includes, with the record; exit code 1 if one is not there or
-    /// differs. May be repeated
+    /// Compare the numbers of this LaTeX text, and of those that it includes, with the record, but for lines that end in `% not a
+    /// result`; exit code 1 if one is not there or differs. May be repeated
     #[arg(long, value_name = "FILE")]
     pub check: Vec<Input>,
 }

@@ -7,7 +7,8 @@
 //!
 //! `harness report DIR --check paper.tex` compares the numbers of a text with the record. A finding is a `\result` of a key that the record
 //! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
-//! more significant digits that is written by hand and that no result rounds to. Texts that it includes are compared as well.
+//! more significant digits that is written by hand and that no result rounds to. Texts that it includes are compared as well. A line that
+//! ends in `% not a result` is not read, so that a version or a clock rate is no finding.
 
 use super::groups::clocks;
 use crate::figure::{file_name, name_apart};
@@ -107,7 +108,7 @@ pub fn tex(numbers: &[Number]) -> String {
 /// Before a word, `in` is one as well.
 const NOT_READ: [&str; 6] = [
     r"\\(?:left\b|in\b|[bB]igg?l?\b|(?:caption|chapter|part|item|title|(?:sub)*section|(?:sub)?paragraph)\b\*?)",
-    r"\\(?:[a-zA-Z]*(?:label|ref|cite[a-z]*|input|url)|include|result|includegraphics|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\]\s*)*\{[^}]*\}",
+    r"(?:[dD][oO][iI][^0-9\n]{0,20}10\.[0-9]{4,9}/[^\s}]*|ar[xX]iv[^0-9\n]{0,10}[0-9]{4}\.[0-9]{4,5})|\\(?:[a-zA-Z]*(?:label|ref|cite[a-z]*|input|url)|include|result|includegraphics|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\]\s*)*\{[^}]*\}",
     r"\\(?:definecolor\s*(?:\{[^}]*\}\s*){3}|[a-zA-Z]*color\s*\[[^\]]*\]\s*\{[^}]*\})",
     r"\\(?:(?:(?:re)?newcommand|def)\*?\s*\{?\s*\\(?:arraystretch|baselinestretch)\s*\}?|linespread|scalebox)\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[\s*[a-zA-Z][^\[\]=]*=[^\[\]]*\]|\\[a-zA-Z]+\*?\[[^\]\n]*\]|[}\]]\[[^\]\n]*[a-zA-Z!][^\]\n]*\]",
@@ -131,7 +132,7 @@ pub struct Checked {
 /// Compares the numbers of a LaTeX text with the results of a record.
 pub fn check(text: &str, numbers: &[Number]) -> Checked {
     let mut found: Vec<(usize, Option<String>)> = Vec::new();
-    let code = without_comments(text);
+    let code = without_comments(&without(r"(?m)^.*% not a result\s*$", text));
     for definition in all(r"(?m)^\s*\\defresult.*$", &code) {
         found.push((definition.start(), defines_otherwise(definition.as_str(), numbers)));
     }
@@ -331,6 +332,8 @@ mod tests {
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\\\\[1.25in] \\vskip 1.25in\n\\href{http://x/1.999%20b}{b}\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
         assert_eq!(check(right, &record), Checked { compared: 12, by_hand: 9, findings: vec![] });
+        let others = "Rust 1.89 and 2.45 GHz % not a result\r\ndoi:10.1137/100791.634, \\doi{10.1007/s1.234}, https://doi.org/10.1145/2.345, arXiv:1706.07931v2 [cs]";
+        assert_eq!(check(others, &record), Checked::default());
         let layout = "\\citep[see][Table 3.129]{x} \\cite [a] [b 3.129] {x} \\textcolor[rgb]{0.1,0.255,0.355}{a} \\rowcolor [gray] {0.905} \\def\\baselinestretch{1.255}\n\
                       \\begin{axis}[width=9cm, x=1.555,\n y=1.255]\\foo[thick,\n scale = 1.255] \\renewcommand{\\arraystretch}{1.255}\\linespread{1.255}\\scalebox{0.555}{a}";
         assert_eq!(check(layout, &record), Checked::default());
@@ -371,6 +374,8 @@ mod tests {
             ("\\caption[n = 3,\n9.87]{a}", "9.87 is written by hand"),
             ("\\textcolor[rgb]{1,0,0}{9.87}", "9.87 is written by hand"),
             ("\\scalebox{0.555}{9.87}", "9.87 is written by hand"),
+            ("1.89 % not a result\n9.87 % no result", "line 2: 9.87 is written by hand"),
+            ("10.1137/9 s", "10.1137 is written by hand"),
             ("\\newcommand{\\a}{9.87}", "9.87 is written by hand"),
             ("\\cite{a} [9.87,\n1.23] = [b]", "9.87 is written by hand"),
             ("\\subsection*[9.87]{a}", "9.87 is written by hand"),
