@@ -73,7 +73,6 @@ impl Case {
         finite("the root's origin", root.origin)?;
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
         let boxes = self.boxes.iter().enumerate().map(|(i, b)| b.on(&root, i));
-        let boxes = boxes.collect::<Result<_, _>>()?;
         let seed = |(number, &given): (usize, &[f64; 3])| {
             finite(&format!("seed {number}"), given)?;
             Ok(Seed { given, lattice: root.nearest(given) })
@@ -84,7 +83,7 @@ impl Case {
             layer_cells_min: self.layer_cells_min,
             keep: self.keep,
             keep_crossing: self.keep_crossing,
-            boxes,
+            boxes: boxes.collect::<Result<_, _>>()?,
             seeds: self.seeds.iter().enumerate().map(seed).collect::<Result<_, Error>>()?,
             enclosed: self.enclosed,
         })

@@ -6,7 +6,7 @@ use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
 use bricks::octant::ROOT_EDGE;
 
-const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise a \
+const FLOW: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise a \
     seed lies beyond the body, or it leaks through an opening that is wider than a cell: move the seed, close the openings that `harness leak CASE --from X,Y,Z` finds from a point in the flow, increase spacing_min, or choose a root that holds the geometry or cuts its open ends";
 const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
     to the far field, or set keep = inside if the flow is internal";
@@ -22,10 +22,11 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     let summary = &mesh.sides.summary;
     let empty = empty_region(keep, summary).filter(|_| is_final && leaks.is_none());
     let flow_at_boundary = is_final && keep == Keep::Inside && summary.inside_reaches_boundary;
+    let at_boundary = FLOW.replace("CASE", case_name);
     // These two already advise to enlarge the root.
     let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
     let others = [
-        (flow_at_boundary && leaks.as_deref() != Some(FLOW_AT_BOUNDARY), FLOW_AT_BOUNDARY),
+        (flow_at_boundary && leaks.as_ref() != Some(&at_boundary), &at_boundary[..]),
         (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
@@ -55,7 +56,7 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
                 "the geometry leaks: the space around it is inside, because an opening joins it with that in the body: close what \
                  `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or increase spacing_min"
             )),
-            _ if is_around && rules.keep == Keep::Inside => Some(FLOW_AT_BOUNDARY.to_owned()),
+            _ if is_around && rules.keep == Keep::Inside => Some(FLOW.replace("CASE", case_name)),
             true => empty.or_else(|| Some(bounds_nothing(rules, case_name))),
             false => empty.filter(|_| rules.keep == Keep::Inside),
         };

@@ -351,6 +351,7 @@ fn leaks_are_warnings_or_errors() {
         let (warnings, leaks) = with_leaks(&slit(20.0, 11.0, Keep::Inside, seeds), comm);
         assert_eq!((warnings.len(), leaks), (1, json!([])));
         assert!(warnings[0].starts_with("the flow reaches the root's boundary"), "{warnings:?}");
+        assert!(warnings[0].contains("`harness leak case.toml --from X,Y,Z`"), "{warnings:?}");
         // The largest leaves, whose rays decide, are in the body, and the space around it has their side.
         let mut open = cuboid([3.0; 3], [61.0; 3]);
         open.retain(|f| f.iter().any(|v| v[0] != 3.0));
