@@ -58,8 +58,7 @@ fn refuse(error: &clap::Error) -> ExitCode {
         let ends = ["Usage:", "For more", "tip: to pass"];
         let is_said = |line: &&str| ends.iter().all(|end| !line.starts_with(end));
         let sentence = lines.take_while(is_said).collect::<Vec<_>>().join(" ");
-        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
-        eprintln!("harness: {sentence}; see --help");
+        eprintln!("harness: {}; see --help", sentence.strip_prefix("error: ").unwrap_or(&sentence));
         return ExitCode::from(EXIT_INPUT);
     }
     match error.print() {

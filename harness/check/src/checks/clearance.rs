@@ -41,8 +41,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
     pub fn check(&self, result: &mut CheckResult) {
         let requires = |handle, level| (self.requires)(handle, level).map(|of| of.by_itself);
         let is_coarse = |handle: Handle, level| {
-            let has_coarse = self.tree.coarsest_level(handle, level) < self.bound;
-            has_coarse.then_some(!handle.is_node())
+            (self.tree.coarsest_level(handle, level) < self.bound).then_some(!handle.is_node())
         };
         let boxes = [Boxes::new(self.tree, &requires), Boxes::new(self.tree, &is_coarse)];
         self.below(&Trail::new(self.tree), (Octant::ROOT, self.tree.root), &boxes, result);

@@ -49,8 +49,7 @@ pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample
 fn band(case: &Case) -> f64 {
     let coordinates = case.facets.iter().flatten().flatten();
     let largest = coordinates.fold(0.0, |most: f64, &c| most.max(f64::from(c).abs()));
-    let single = 16.0 * f64::from(f32::EPSILON) * largest;
-    single.max(4.0 * case.root.edge / UNITS_PER_EDGE as f64)
+    (16.0 * f64::from(f32::EPSILON) * largest).max(4.0 * case.root.edge / UNITS_PER_EDGE as f64)
 }
 
 /// Whether every edge belongs to an even number of facets on the lattice, regardless of their winding.

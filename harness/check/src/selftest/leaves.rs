@@ -56,8 +56,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     words("all leaves shifted by half the root", "sides", INFORMED, |s| {
         let words = mutant::shifted(&s.mesh.words, CELLS_PER_EDGE / 2);
         let crossing = s.mesh.words.iter().any(|&w| word::is_crossing(w));
-        let moved = words.iter().any(|w| s.mesh.words.binary_search(w).is_err());
-        (crossing && moved).then_some(words)
+        (crossing && words.iter().any(|w| s.mesh.words.binary_search(w).is_err())).then_some(words)
     }),
     words("mesh mirrored", "identical", INFORMED, |s| {
         Some(mutant::mirrored(&s.mesh.words)).filter(|words| *words != s.mesh.words)
@@ -77,8 +76,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let octant = Octant::ROOT.child(0).child(0);
         let (inside, left): (Vec<u64>, Vec<u64>) =
             s.mesh.words.iter().partition(|&&w| octant.contains(&word::octant(w)));
-        let crossing = inside.iter().any(|&w| word::is_crossing(w));
-        (!crossing && !inside.is_empty()).then_some(left)
+        (!inside.iter().any(|&w| word::is_crossing(w)) && !inside.is_empty()).then_some(left)
     }),
     words("all leaves after the first half removed", "complete", INFORMED, |s| {
         Some(s.mesh.words[..s.mesh.words.len() / 2].to_vec())

@@ -112,8 +112,7 @@ const PARTS: usize = 3;
 
 /// The case with its mesh in several parts that interleave in Morton order, like those of METIS.
 pub(super) fn in_parts(correct: &SelftestCase) -> SelftestCase {
-    let mesh = with_words(&correct.mesh, correct.mesh.words.clone());
-    SelftestCase { mesh, ..correct.clone() }
+    SelftestCase { mesh: with_words(&correct.mesh, correct.mesh.words.clone()), ..correct.clone() }
 }
 
 /// The set with other leaves.
@@ -175,8 +174,7 @@ pub(super) fn split_first(words: &[u64], predicate: impl Fn(u64) -> bool) -> Opt
 pub(super) fn sibling_groups(words: &[u64]) -> Vec<usize> {
     let are_siblings =
         |eight: &[u64]| word::level(eight[0]) > 0 && eight == children(parent(eight[0])).as_slice();
-    let complete = |i: &usize| words[*i..].get(..8).is_some_and(are_siblings);
-    (0..words.len()).filter(complete).collect()
+    (0..words.len()).filter(|i: &usize| words[*i..].get(..8).is_some_and(are_siblings)).collect()
 }
 
 /// The parent of a leaf, with the leaf's side.

@@ -44,8 +44,7 @@ pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth> {
         "the mesh was made from other inputs than the case ({differing}); give the case file from which it was made"
     );
     Failure::unless(differing.is_empty(), why)?;
-    let most = Truth::LEAVES_MAX;
-    let why = format!("T0 of the case has more than {most} leaves: omit --case");
+    let why = format!("T0 of the case has more than {} leaves: omit --case", Truth::LEAVES_MAX);
     Truth::of(case, &inputs).ok_or(Failure::input(why))
 }
 

@@ -245,8 +245,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     }
     let (without, has_series) = (left.find(|of| !runs.contains(of)), !study.series.is_empty());
     let is_open = |r: &Judged| {
-        let is_target = r.row.at_least.or(r.row.at_most).is_some();
-        is_target && r.measured.is_none() && r.why != NO_MPI
+        r.row.at_least.or(r.row.at_most).is_some() && r.measured.is_none() && r.why != NO_MPI
     };
     let why = match without {
         _ if !rows.is_empty() && rows.iter().all(|r| r.measured.is_none()) => "no row was measured",

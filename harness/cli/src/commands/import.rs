@@ -89,8 +89,7 @@ impl Source {
     /// Reads the mesh.
     fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported> {
         let Self { format, root, position, timeout, .. } = *self;
-        let sides = self.sides.clone();
-        let request = Request { sides, root, position, ..Request::default() };
+        let request = Request { sides: self.sides.clone(), root, position, ..Request::default() };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
         let limit = timeout.unwrap_or(Duration::from_secs(3600));
         let mut imported = import(mesh, format, &request, case, program, limit)?;

@@ -194,8 +194,7 @@ impl Engine {
         });
         let written = written.transpose().map_err(|end| self.failure(end))?;
         let report = self.report(written.as_ref(), options, layout.ranks.count(), &finished);
-        let report = report.map_err(|why| self.unusable(why))?;
-        Ok(Completed { report, finished, command })
+        Ok(Completed { report: report.map_err(|why| self.unusable(why))?, finished, command })
     }
 
     /// Meshes a case in a directory without a run report; returns the leaf-set directory.

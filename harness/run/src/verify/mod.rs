@@ -128,8 +128,7 @@ impl Workplace {
     fn new(options: &Options) -> Result<Self> {
         if let Some(out) = &options.out {
             let root = fs::create_dir_all(out).and_then(|()| fs::canonicalize(out));
-            let root = root.map_err(|error| Failure::at(out, error))?;
-            return Ok(Self { root, temporary: None });
+            return Ok(Self { root: root.map_err(|e| Failure::at(out, e))?, temporary: None });
         }
         let temporary = tempfile::Builder::new().prefix("harness-verify-").tempdir()?;
         Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary) })
