@@ -31,9 +31,13 @@ struct Fixture(TempDir);
 impl Fixture {
     /// A box from -2 to 2 with a hole in the wall at the highest z, and its base trees.
     fn new() -> Self {
+        Self::in_root(ROOT)
+    }
+
+    fn in_root(root: &str) -> Self {
         let fixture = Self(tempfile::tempdir().unwrap());
         fs::create_dir(fixture.path("tmp")).unwrap();
-        let text = format!("geometry = \"box.stl\"\nspacing_min = 0.5\n{ROOT}");
+        let text = format!("geometry = \"box.stl\"\nspacing_min = 0.5\n{root}");
         fs::write(fixture.path("case.toml"), text).unwrap();
         let mut quads = Vec::new();
         for (axis, side) in [(0, -2.0), (0, 2.0), (1, -2.0), (1, 2.0), (2, -2.0)] {
@@ -98,7 +102,7 @@ fn a_leak_is_described_in_text_and_json() {
     let answer = &json["examined"][0];
     assert_eq!(
         (json["schema"].as_str(), answer["is_leak"].as_bool()),
-        (Some("octree-leak/4"), Some(true))
+        (Some("octree-leak/5"), Some(true))
     );
     let width = answer["passage"]["narrowest"]["width"].as_f64().unwrap();
     assert!((width / 2.0 - 1.0).abs() < 0.05, "{width}");
@@ -170,6 +174,26 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
         code == 2 && text.contains("as where an opening is wider than four cells"),
         "{code}: {text}"
     );
+}
+
+/// The root cuts the box, which is closed at this spacing, and the scripted mesher gives no leaf an inside.
+#[test]
+fn without_a_start_a_space_that_the_root_cuts_is_examined() {
+    let root = &ROOT.replace("-8.1", "-1.4");
+    let fixture = Fixture::in_root(root);
+    let text = format!("geometry = \"box.stl\"\nspacing_min = 2.0\n{root}");
+    fs::write(fixture.path("case.toml"), &text).unwrap();
+    let manifest = fixture.path("2.0/mesh.json");
+    let own = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, own.replacen('{', r#"{"leaks": [],"#, 1)).unwrap();
+    let (code, printed) = fixture.leak(&["--json", "leak.json"]);
+    assert!(code == 0 && printed.matches("meshed as flow").count() == 1, "{code}: {printed}");
+    let json = fs::read_to_string(fixture.path("leak.json")).unwrap();
+    assert!(json.contains(r#""is_cut": true"#), "{json}");
+    // Seeds decide what is flow, and nothing else is kept.
+    fs::write(fixture.path("case.toml"), format!("seeds = [[5.0, 5.0, 5.0]]\n{text}")).unwrap();
+    let (code, printed) = fixture.leak(&[]);
+    assert!(code != 1 && !printed.contains("meshed as flow"), "{code}: {printed}");
 }
 
 /// The box is closed at both coarser spacings, with and without a seed in it.

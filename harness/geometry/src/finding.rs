@@ -24,7 +24,7 @@ pub enum Kind {
     Winding,
     /// Closed shells of consistent winding that enclose a negative volume, apart from [`Self::Nested`] ones.
     InsideOut,
-    /// Closed shells that lie in an odd number of others.
+    /// Closed shells, also up to T-junctions, that lie in an odd number of others.
     Nested,
     /// Facets without area with a corner, or the middle of an edge, on no facet with area.
     Stray,
@@ -160,7 +160,7 @@ impl Kind {
             Self::OutsideRoot => ("facets beyond the root",
                 "The root cuts the body, whose facets beyond it rays still count. Enlarge the root if the body is to be meshed whole."),
             Self::TouchingRoot => ("facets on the root's boundary",
-                "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there."),
+                "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there. With keep = outside, a cavity that is open there alone is flow, unless seeds leave it out: harness leak lists it."),
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Result, progress, uninterrupted};
 use contract::leafset::LeafSet;
-use contract::manifest::{Keep, Leak};
+use contract::manifest::{Keep, Leak, Manifest};
 use contract::plain::PlainCase;
 use geometry::leak::{Leaks, Target};
 use report::pretty;
@@ -77,13 +77,16 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         }
         (None, None) => {
             progress("meshing the base tree of the case");
-            let tree = tree(case.level_surface)?;
-            let leaked = leaked(&case, &tree)?;
-            of_case.set(Some(tree.words));
+            let LeafSet { words, manifest, .. } = tree(case.level_surface)?;
+            of_case.set(Some(words));
+            let is_flow = case.keep == Keep::Outside && case.seeds.is_empty();
+            let cut = if is_flow { leaks.cut()? } else { Vec::new() };
+            let leaked = leaked(&case, &manifest, cut.is_empty())?;
             let regions = leaks.regions(&leaked)?.into_iter();
             // Seeds lie in the flow, into which the region leaked.
             let seed = |from| Ok((from, leaks.seed(Target::Point(from))?));
-            let ends = regions.map(seed).collect::<Result<Vec<_>>>()?.into_iter();
+            let ends = regions.map(seed).chain(cut.into_iter().map(|at| Ok((at, None))));
+            let ends = ends.collect::<Result<Vec<_>>>()?.into_iter();
             ends.map(|(from, seed)| (from, seed.map_or(Target::Far, Target::Point))).collect()
         }
     };
@@ -105,15 +108,15 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 /// What to do where there is no start.
 const START: &str = "give a start with --from X,Y,Z, in the space that should be closed";
 
-/// What leaked between coarser spacings and the case's, as the mesher reports it.
-fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
-    let leaks = tree.manifest.leaks.clone();
+/// What leaked between coarser spacings and the case's, as the mesher reports it. If nothing else is examined, there must be something that may.
+fn leaked(case: &Case, manifest: &Manifest, is_all: bool) -> Result<Vec<Leak>, String> {
+    let leaks = manifest.leaks.clone();
     let leaks = leaks.ok_or_else(|| format!("the program does not report leaks: {START}"))?;
-    let sides = tree.manifest.leaves_by_side;
+    let sides = manifest.leaves_by_side;
     // Seeds lie in the flow, and what they do not reach has the other side.
     let is_flow_inside = case.keep == Keep::Inside && !case.seeds.is_empty();
     let closed = if is_flow_inside { sides.outside } else { sides.inside };
-    if leaks.is_empty() && closed == 0 {
+    if is_all && leaks.is_empty() && closed == 0 {
         let fact = match case.seeds.is_empty() {
             true => {
                 "no leaf is inside by its rays at this spacing, as where an opening is wider than four cells or every facet appears twice"

@@ -55,8 +55,11 @@ pub struct Leaks<'a, F> {
     facets: FacetTree,
     /// Makes the sorted leaf words of the case's base tree at a surface level.
     make: F,
-    /// Those that were made.
+    /// Those that were made, with all that is outside at the root's boundary but the largest space taken for inside: the far field is one space,
+    /// and the root may cut others, such as the cavity of a half model.
     trees: BTreeMap<u8, Vec<u64>>,
+    /// The leaves of these others in the case's own tree, by index.
+    cut: Vec<Vec<u32>>,
 }
 
 impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
@@ -68,7 +71,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         let why = "the case has no facets, so nothing separates places";
         Failure::unless(!case.facets.is_empty(), why)?;
         let facets = FacetTree::new(&case.facets_lattice);
-        Ok(Self { case, facets, make, trees: BTreeMap::new() })
+        Ok(Self { case, facets, make, trees: BTreeMap::new(), cut: Vec::new() })
     }
 
     /// Answers for pairs of places, with their invariants checked.
@@ -96,12 +99,13 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         let (is_leak, closes, passage) = (widest.is_some(), None, None);
         let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
         let is_enclosed = !is_leak && to == Target::Far && is_outside && self.case.seeds.is_empty();
-        let mut report = Report { from, to, spacing, is_leak, is_enclosed, closes, passage };
+        let is_cut = to == Target::Far && self.is_cut(start);
+        let mut found = Report { from, to, spacing, is_leak, is_enclosed, is_cut, closes, passage };
         if let Some(finest) = widest {
             // The widest opening is as wide as the leaves of a path, or 4 times those two levels below. There its ball's centre lies in
             // free leaves: no finer tree has a wider path. The coarsest tree that joins the ends may do so through the finer cells of a
             // box, and close a wider opening.
-            report.closes = self.coarsen(ends, outside, finest)?;
+            found.closes = self.coarsen(ends, outside, finest)?;
             for measured in level.min(finest + 2)..=level {
                 self.make_tree(measured)?;
                 progress("measuring the width");
@@ -114,13 +118,13 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
                     passage.check_invariants(self.case, (words, outside), (from, to));
                     // The cells of a finer box stay as they are, and so does the opening among them, whatever facets cross at the ends.
                     let cell = passage.narrowest.cell_of_boxes;
-                    report.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
-                    report.passage = Some(passage);
+                    found.closes.take_if(|at| at.is_end_crossed && cell < at.spacing.spacing);
+                    found.passage = Some(passage);
                     break;
                 }
             }
         }
-        Ok(report)
+        Ok(found)
     }
 
     /// What [`Self::search`] finds in a base tree; and the level whose outside is the far field, if that is not all of the root's boundary.
@@ -134,7 +138,13 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
             progress(&format!("meshing the base tree of level {level}"));
-            self.trees.insert(level, (self.make)(level)?);
+            let mut words = (self.make)(level)?;
+            let cut = Space::new(&words, &self.facets, None)?.cut();
+            cut.iter().flatten().for_each(|&cell| words[cell as usize] |= Side::Inside as u64);
+            if level == self.case.level_surface {
+                self.cut = cut;
+            }
+            self.trees.insert(level, words);
         }
         Ok(())
     }
@@ -145,10 +155,30 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         [Some(("--from", from)), to.map(|to| ("--to", to))].into_iter().flatten().find(is_crossed)
     }
 
-    /// The finest coarser level at which the start is inside, if part of the root's boundary is outside there. The root may cut the body, so
-    /// only that part is the far field.
+    /// A point of each space that is outside at the case's spacing, and that the root cuts off the far field.
+    ///
+    /// # Errors
+    /// If the base tree cannot be made.
+    pub fn cut(&mut self) -> Result<Vec<[f64; 3]>> {
+        self.make_tree(self.case.level_surface)?;
+        let (root, words) = (&self.case.root, &self.trees[&self.case.level_surface]);
+        let leaf = |&cell: &u32| word::octant(words[cell as usize]);
+        let largest = |of: &Vec<u32>| of.iter().map(leaf).min_by_key(|leaf| leaf.level);
+        let largest = self.cut.iter().filter_map(largest);
+        Ok(largest.map(|leaf| root.rounded(root.to_user(leaf.centre()))).collect())
+    }
+
+    /// Whether a place lies in such a space.
+    fn is_cut(&self, at: Point) -> bool {
+        let Some(words) = self.trees.get(&self.case.level_surface) else { return false };
+        let leaf = leaf_at(words, at);
+        self.cut.iter().flatten().any(|&cell| words[cell as usize] == leaf)
+    }
+
+    /// The finest coarser level at which the start is inside, or the case's if the root cuts it off there, if part of the root's boundary is
+    /// outside at this level. The root may cut the body, so only that part is the far field.
     fn closed(&mut self, start: Point) -> Result<Option<u8>> {
-        for level in (0..self.case.level_surface).rev() {
+        for level in (0..self.case.level_surface + u8::from(self.is_cut(start))).rev() {
             self.make_tree(level)?;
             let words = &self.trees[&level];
             if word::side(leaf_at(words, start)) == Side::Inside {

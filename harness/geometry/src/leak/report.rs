@@ -1,4 +1,4 @@
-//! The answer as data, as JSON of the schema `octree-leak/4` when serialised, and for a terminal. Lengths are in the user's units.
+//! The answer as data, as JSON of the schema `octree-leak/5` when serialised, and for a terminal. Lengths are in the user's units.
 //!
 //! Its invariants are in `super::invariants`.
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::fmt;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-leak/4";
+pub const SCHEMA: &str = "octree-leak/5";
 
 /// A surface level and its spacing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -98,6 +98,8 @@ pub struct Report {
     pub is_leak: bool,
     /// Whether the start is outside by its rays, although no path joins it to the far field.
     pub is_enclosed: bool,
+    /// Whether no path joins the start to the far field, but it is outside, and the root's boundary opens its space.
+    pub is_cut: bool,
     /// The coarser level, the nearest to the case's, whose base tree does not join the ends.
     pub closes: Option<Closes>,
     /// The widest path if there is a leak, at the case's level or a coarser one that joins the ends.
@@ -127,13 +129,16 @@ const END: &str = "          This is the widest place near the start or the end:
 /// What follows where no path explains that the start is outside.
 const ENCLOSED: &str = ": the facets enclose the start, although by its rays it is outside, as beside openings, overlaps and facets that appear \
     twice (`harness geometry`). If the mesher reports that it leaked, its rays have changed their verdict, and no path has opened";
+/// What follows where the root's boundary alone opens the space of the start.
+const CUT: &str = ", but the start is outside, and the root's boundary opens its space, so it is meshed as flow if keep = outside, as a cavity \
+    of a half model would be: give a seed in the flow (seeds) if that is not meant";
 const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
 
 impl fmt::Display for Answers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Many regions may have the same answer without a path.
         let is_same = |a: &Report, b: &Report| {
-            let [a, b] = [a, b].map(|of| (of.to, of.is_leak, of.is_enclosed));
+            let [a, b] = [a, b].map(|of| (of.to, of.is_leak, of.is_enclosed, of.is_cut));
             a == b && !a.1
         };
         for (i, same) in self.examined.chunk_by(is_same).enumerate() {
@@ -157,8 +162,9 @@ impl fmt::Display for Report {
         let (from, at) = (point(self.from), spacing(&self.spacing));
         writeln!(f, "from      {from}\nto        {to}\nspacing   {at}\n")?;
         let Some(passage) = &self.passage else {
-            let enclosed = if self.is_enclosed { ENCLOSED } else { "" };
-            return writeln!(f, "no leak at this spacing{enclosed}");
+            let remark = if self.is_enclosed { ENCLOSED } else { "" };
+            let remark = if self.is_cut { CUT } else { remark };
+            return writeln!(f, "no leak at this spacing{remark}");
         };
         let verdict = match passage.narrowest.is_end {
             true => "JOINED: start and end lie in one space, or one of them within the opening",
@@ -234,6 +240,7 @@ mod tests {
             spacing,
             is_leak: true,
             is_enclosed: false,
+            is_cut: false,
             closes: Some(Closes { spacing: Spacing::of(2, &root), is_end_crossed: true }),
             passage: Some(Passage { spacing, narrowest, inner: (0, points.len() - 1), points }),
         }

@@ -12,6 +12,7 @@ use crate::tree::{FacetTree, Point};
 use contract::failure::{Result, uninterrupted};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
+use contract::sets::Sets;
 use contract::word::{self, KEY_END, Order, Side};
 use parry3d_f64::query::PointQuery as _;
 
@@ -110,6 +111,25 @@ impl<'a> Space<'a> {
         let is_outside = |words| word::side(leaf_at(words, cell.centre())) == Side::Outside;
         let is_at_face = |&c: &u32| c == 0 || i64::from(c + cell.edge) == UNITS_PER_EDGE;
         cell.low.iter().any(is_at_face) && self.outside.is_none_or(is_outside)
+    }
+
+    /// The leaves of each space that is outside at the root's boundary, by index, but for the largest of these spaces.
+    pub fn cut(&self) -> Vec<Vec<u32>> {
+        let word = |cell: &u32| self.words[*cell as usize];
+        let is_outside = |cell: &u32| word::side(word(cell)) == Side::Outside;
+        let all = || (0..self.words.len() as u32).filter(is_outside);
+        let (mut sets, mut joined) = (Sets::new(self.words.len()), Vec::new());
+        for cell in all() {
+            self.neighbours(cell, &mut joined);
+            joined.drain(..).filter(is_outside).for_each(|next| sets.union(cell, next));
+        }
+        let mut spaces: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        all().for_each(|cell| spaces.entry(sets.root(cell)).or_default().push(cell));
+        let is_cut = |of: &Vec<u32>| of.iter().any(|c| word::octant(word(c)).is_at_boundary());
+        let mut spaces: Vec<_> = spaces.into_values().filter(is_cut).collect();
+        let volume = |of: &Vec<u32>| of.iter().map(|c| word::span(word::level(word(c)))).sum();
+        spaces.sort_by_key(|of| Reverse::<u64>(volume(of)));
+        spaces.into_iter().skip(1).collect()
     }
 
     /// The cell that contains a point of the root.

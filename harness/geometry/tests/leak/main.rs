@@ -258,6 +258,40 @@ fn a_closed_body_does_not_leak() {
     }
 }
 
+/// A body on a face of the root, with a cavity that is open there alone, closed and with a hole in the wall between: the place where the root
+/// cuts the cavity is no opening, and the far field is the largest of the spaces at the root's boundary.
+#[test]
+fn a_cavity_that_only_the_roots_boundary_opens_is_flow_and_no_leak() {
+    let wall = |edge| {
+        let mut cube = Generator::new(Shape::Cube, 12);
+        (cube.edge, cube.centre) = (Some(edge), Some([0.0; 3]));
+        cube.facets().unwrap()
+    };
+    let closed = [wall(3.0), wall(2.0)].concat();
+    let root = Root { origin: [0.0, -4.13, -4.07], edge: 8.0 };
+    let of = |level| case_in(root, &closed, level);
+    for level in [5, 7] {
+        let case = of(level);
+        let tree = |level| Ok(base_tree(&case.facets_lattice, |_| level));
+        let mut leaks = Leaks::new(&case, tree).unwrap();
+        // These base trees have no inside: the space between the walls is outside, too.
+        let mut cut = leaks.cut().unwrap();
+        cut.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        assert!(cut.len() == 2 && cut.iter().any(|at| at.iter().all(|c| c.abs() < 1.0)), "{cut:?}");
+        for from in [cut[0], cut[1], [0.3; 3]] {
+            let report = leaks.answers(&[(from, Target::Far)]).unwrap().examined.remove(0);
+            let text = report.to_string();
+            assert!(!report.is_leak && report.is_cut && text.contains("meshed as flow"), "{text}");
+        }
+        let far = leaks.answers(&[([3.0; 3], Target::Far)]).unwrap().examined.remove(0);
+        assert!(far.is_leak && !far.is_cut);
+    }
+    let body = hole(0.2);
+    let case = case_in(Root { origin: [0.07, -4.13, -4.07], edge: 8.0 }, &body.facets, 7);
+    let report = ask(&case, [0.3, 0.0, 0.0], Target::Far).unwrap();
+    assert_describes(&report, &body, "a hole in a body that the root cuts");
+}
+
 #[test]
 fn a_coarser_base_tree_that_cannot_be_meshed_is_no_answer() {
     let case = case(&bodies()[0].facets, 8);
