@@ -169,7 +169,7 @@ mod tests {
         let facets = vec![plane, across, [r, q, p]];
         let input = Input::of(Default::default(), facets, Requested::default()).unwrap();
         let lattice = &input.case.facets_lattice;
-        let shells = Shells::new(&Edges::new(&input.case.facets, lattice), lattice);
+        let shells = Shells::new(&Edges::new(&input.case.facets, lattice), lattice, &[].into());
         let mut tree = FacetTree::new(lattice);
         let found = |tree: &FacetTree| {
             let finding = intersections(&input, tree, &shells, 5);

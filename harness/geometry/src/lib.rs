@@ -28,8 +28,9 @@ use tree::FacetTree;
 /// Diagnoses a geometry and lists the first places of each finding. The counts do not depend on the order of the facets or of a facet's vertices.
 pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let edges = Edges::new(&input.case.facets, &input.case.facets_lattice);
-    let shells = Shells::new(&edges, &input.case.facets_lattice);
-    let mut findings = vec![openings::openings(input, &edges, first)];
+    let (openings, torn) = openings::openings(input, &edges, first);
+    let shells = Shells::new(&edges, &input.case.facets_lattice, &torn);
+    let mut findings = vec![openings];
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     let tree = FacetTree::new(&input.case.facets_lattice);

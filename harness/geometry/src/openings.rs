@@ -18,12 +18,13 @@ use super::edges::{Edges, Use};
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::{Aabb, Point};
+use std::collections::HashSet;
 
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
 const TOLERANCE: f64 = 2.0;
 
-/// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex.
-pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
+/// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex; and the facets at them.
+pub fn openings(input: &Input, edges: &Edges, first: usize) -> (Finding, HashSet<u32>) {
     // Where all facets are copies of one, a surface ends of which every facet is there twice.
     let corners = |of: &Use| edges.corners[of.facet as usize].map(sorted);
     let is_open = |uses: &&[Use]| uses.iter().all(|of| corners(of) == corners(&uses[0]));
@@ -48,12 +49,13 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     let width = |place: &Place| place.width.unwrap_or(0.0);
     places.sort_by(|(a, _), (b, _)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
     let leaks = |(place, extent): &&(Place, Aabb)| width(place) >= cell_in(extent);
-    Finding {
+    let finding = Finding {
         count: places.len() as u64,
         count_changing: places.iter().filter(leaks).count() as u64,
         places: places.into_iter().take(first).map(|(place, _)| place).collect(),
         ..Finding::new(Kind::Openings)
-    }
+    };
+    (finding, rims.iter().map(|rim| rim.facet).collect())
 }
 
 /// The places of connected segments, with their bounding boxes.

@@ -83,7 +83,7 @@ impl Diagnosis {
         let of_edges = [Kind::NonManifoldOdd, Kind::Winding].map(count);
         assert_eq!(of_edges, [edges.odd, edges.flipped], "findings of edges with {edges:?}");
         let inward = count(Kind::InsideOut) + count(Kind::Nested);
-        assert!(inward <= shells.closed, "{inward} are wound inward, or nested: {shells:?}");
+        assert!(inward <= shells.count, "{inward} are wound inward, or nested: {shells:?}");
         let cell = self.cell.unwrap_or(f64::INFINITY);
         for finding in &self.findings {
             let most = match finding.kind {

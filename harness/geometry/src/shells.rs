@@ -9,7 +9,7 @@ use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::{Aabb, triangle};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A shell.
 pub struct Shell {
@@ -17,11 +17,13 @@ pub struct Shell {
     pub facet_first: u32,
     /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
     pub is_closed: bool,
-    /// Whether as many facets traverse every edge in one direction as in the other.
+    /// Whether it is closed, or open only at T-junctions and where the root cuts it.
+    is_tight: bool,
+    /// Whether as many facets traverse every edge in one direction as in the other, but for edges with one facet.
     is_oriented: bool,
-    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
+    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented` and `is_tight`.
     volume_sixfold: i128,
-    /// Whether it is closed and lies in an odd number of other shells, by all rays, so that its interior is outside.
+    /// Whether it is tight and lies in an odd number of other shells, by all rays, so that its interior is outside.
     is_nested: bool,
     /// Whether it is wound the other way than the shells around it, by the sum of all rays: one flipped facet changes nothing.
     is_cavity: bool,
@@ -46,8 +48,8 @@ pub struct Shells {
 }
 
 impl Shells {
-    /// Connects the facets that share edges.
-    pub fn new(edges: &Edges, lattice: &[FacetLattice]) -> Self {
+    /// Connects the facets that share edges; those at openings are `torn`.
+    pub fn new(edges: &Edges, lattice: &[FacetLattice], torn: &HashSet<u32>) -> Self {
         let mut sets = Sets::new(edges.corners.len());
         for uses in edges.iter() {
             uses[1..].iter().for_each(|other| sets.union(uses[0].facet, other.facet));
@@ -62,6 +64,7 @@ impl Shells {
                 all.push(Shell {
                     facet_first: first,
                     is_closed: true,
+                    is_tight: true,
                     is_oriented: true,
                     volume_sixfold: 0,
                     is_nested: false,
@@ -76,16 +79,18 @@ impl Shells {
         }
         for uses in edges.iter() {
             let shell = &mut all[of[uses[0].facet as usize] as usize];
-            shell.is_closed &= uses.len() % 2 == 0;
-            shell.is_oriented &= 2 * uses.iter().filter(|one| one.is_down).count() == uses.len();
+            let n = uses.len();
+            shell.is_closed &= n % 2 == 0;
+            shell.is_tight &= n % 2 == 0 || n == 1 && !torn.contains(&uses[0].facet);
+            shell.is_oriented &= n == 1 || 2 * uses.iter().filter(|one| one.is_down).count() == n;
         }
         let mut own = vec![Vec::new(); all.len()];
         for (facet, shell) in lattice.iter().zip(&of).filter(|(_, shell)| **shell != u32::MAX) {
             own[*shell as usize].push(*facet);
         }
         let mut interiors: HashMap<usize, Parity> = HashMap::new();
-        let closed: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_closed).collect();
-        for &index in &closed {
+        let tight: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_tight).collect();
+        for &index in &tight {
             // Within an open shell, it may matter which corner: it does not depend on the order of the facets.
             let corner = *own[index].iter().flatten().min().expect("a shell has facets");
             let winding = |other: usize| {
@@ -108,7 +113,7 @@ impl Shells {
     pub fn outward(&self, facet: u32) -> Option<bool> {
         let shell = self.all.get(self.of[facet as usize] as usize)?;
         let is_inward = (shell.volume_sixfold < 0) != shell.is_nested;
-        (shell.is_oriented && shell.volume_sixfold != 0).then_some(!is_inward)
+        (shell.is_closed && shell.is_oriented && shell.volume_sixfold != 0).then_some(!is_inward)
     }
 
     /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
@@ -121,7 +126,7 @@ impl Shells {
     pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
         let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
         for shell in &self.all {
-            let is_wound_inward = shell.is_oriented && shell.volume_sixfold < 0;
+            let is_wound_inward = shell.is_closed && shell.is_oriented && shell.volume_sixfold < 0;
             if !shell.is_nested && !is_wound_inward {
                 continue;
             }

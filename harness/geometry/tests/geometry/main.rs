@@ -266,6 +266,19 @@ fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
         assert_eq!((found.shells.closed, count(&found, Kind::Nested)), (1, 1), "{found}");
         assert!(found.changes_region);
     }
+    // The inner one may be open at T-junctions, too, also wound as a cavity, but not at an opening.
+    let [p, q, r] = nested[12];
+    let middle = [0, 1, 2].map(|x| (q[x] + r[x]) / 2.0);
+    for is_solid in [true, false] {
+        let inner = [&nested[13..], &[[p, q, middle], [p, middle, r]]].concat();
+        let inner = inner.iter().map(|&[a, b, c]| if is_solid { [a, b, c] } else { [c, b, a] });
+        let found =
+            case(&nested[..12].iter().copied().chain(inner).collect::<Vec<_>>(), "keep = 'inside'");
+        assert_eq!((found.shells.closed, count(&found, Kind::Nested)), (1, 1), "{found}");
+        assert_eq!(found.changes_region, is_solid, "{found}");
+    }
+    let torn = case(&[&nested[..12], &nested[13..]].concat(), "keep = 'inside'");
+    assert_eq!((count(&torn, Kind::Nested), count(&torn, Kind::Openings)), (0, 1), "{torn}");
     // Both solids inside out are the same; one of them alone makes the inner one a cavity.
     let reversed = |i: usize, facet: &Facet, at: &[usize]| {
         let [a, b, c] = *facet;
