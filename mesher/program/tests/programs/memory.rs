@@ -52,9 +52,19 @@ fn the_plan_of_a_case_with_few_cells_is_its_mesh() {
         assert_eq!(of(&plan, "memory_peak_bytes"), of(&report, "peak_rss_bytes"));
         assert_eq!(plan["fits"], true);
     }
-    let planned = run(workspace.mesher(&["case.toml", "--plan", "--out", "mesh", "--quiet"]));
-    planned.succeeds();
-    assert!(!workspace.path().join("mesh").exists(), "a plan must write no mesh");
+    // From one cell on, of which the file of the tree is nearly all header.
+    for spacing in ["9", "0.2", "0.03"] {
+        workspace.write("case.toml", format!("spacing_min = {spacing}\n{BODY}"));
+        let args = ["case.toml", "--write", "htg", "--out", spacing, "--quiet"];
+        let plan = ["--plan", "--json", "plan.json"];
+        run(workspace.mesher(&[&args[..], &plan].concat())).succeeds();
+        assert!(!workspace.path().join(spacing).exists(), "a plan must write no mesh");
+        run(workspace.mesher(&args)).succeeds();
+        let planned = workspace.json("plan.json")["tree_bytes"].as_f64().expect("a number");
+        let file = workspace.path().join(spacing).join("mesh.vtkhdf");
+        let bytes = file.metadata().expect("the tree is written").len() as f64;
+        assert!((0.5..2.0).contains(&(planned / bytes)), "{planned} for {bytes} at {spacing}");
+    }
 }
 
 #[test]
