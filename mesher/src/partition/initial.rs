@@ -167,20 +167,21 @@ mod tests {
         (0..50).flat_map(|i| (0..40).flat_map(move |j| square(i, j))).collect()
     }
 
-    /// Owners of the fine octants, where rank `rank_of(i)` has facet number `i` in its slice.
-    fn owners_by(rules: &Rules, rank_of: impl Fn(usize) -> usize + Sync) -> Vec<usize> {
+    /// Owners of the fine octants.
+    fn owners(ownership: &Ownership) -> Vec<usize> {
+        (0..1 << (3 * FINE)).map(|code| ownership.owner_at(start57(FINE, code))).collect()
+    }
+
+    /// The partition on which all ranks agree, where rank `rank_of(i)` has facet number `i` in its slice.
+    fn partitioned(rules: &Rules, rank_of: impl Fn(usize) -> usize + Sync) -> Ownership {
         let all = sheet();
         let known = sim::run(RANKS, 5, |comm| {
             let on_this = |(i, f): (usize, &Facet)| (rank_of(i) == comm.rank()).then_some(*f);
             let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
-            let estimate = Estimate { facets: &mine, rules, comm };
-            let ownership = estimate.by_area([4, FINE, FINE]);
-            (0..1 << (3 * FINE))
-                .map(|code| ownership.owner_at(start57(FINE, code)))
-                .collect::<Vec<_>>()
+            Estimate { facets: &mine, rules, comm }.by_area([4, FINE, FINE])
         });
-        assert!(known.iter().all(|s| *s == known[0]), "all ranks have the same partition");
-        known.into_iter().next().unwrap_or_default()
+        assert!(known.iter().all(|o| o.boundaries() == known[0].boundaries()), "one partition");
+        known.into_iter().next().expect("a rank")
     }
 
     /// Estimated leaves on each rank.
@@ -200,10 +201,11 @@ mod tests {
         let slab = ExtentBox { min: [h, h, 5 * h], max: [6 * h, 6 * h, 6 * h], level: 8 };
         for boxes in [vec![], vec![slab]] {
             let rules = rules(boxes);
-            let owners = owners_by(&rules, |i| i % RANKS);
+            let ownership = partitioned(&rules, |i| i % RANKS);
             for slices in [|i| i * RANKS / 4000, |_| 3] {
-                assert_eq!(owners_by(&rules, slices), owners);
+                assert_eq!(partitioned(&rules, slices).boundaries(), ownership.boundaries());
             }
+            let owners = owners(&ownership);
             assert!(owners.is_sorted());
             let sums = weights(&rules, &owners);
             let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
@@ -230,9 +232,7 @@ mod tests {
         };
         let area = of(division(Weights::Area, Some(FINE)));
         assert_eq!(area.level_base, FINE);
-        let owners: Vec<usize> =
-            (0..1 << (3 * FINE)).map(|c| area.ownership.owner_at(start57(FINE, c))).collect();
-        let sums = weights(&rules, &owners);
+        let sums = weights(&rules, &owners(&area.ownership));
         let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
         assert!(sums.iter().all(|&w| (w as f64 / mean - 1.0).abs() < 0.1), "{sums:?}");
         let unit = of(division(Weights::Unit, Some(FINE)));
