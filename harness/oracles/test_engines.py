@@ -156,7 +156,7 @@ class EnginesTest(unittest.TestCase):
         self.assertEqual(code, 1, printed)
         self.assertRegex(printed, r"wrote a mesh that cannot be imported: \S*written/mesh.csv: cell \d+ .* overlaps")
         engine = self.at / "overlap.toml"
-        engine.write_text(re.sub("serial = .*", 'serial = ["true", "{out}.csv"]', engine.read_text()))
+        engine.write_text(re.sub("serial = .*", 'serial = ["true", "{case}", "{out}.csv"]', engine.read_text()))
         code, printed, _ = run("harness", "verify", self.at / "case.toml", "--engine", engine)
         self.assertEqual(code, 1, printed)
         self.assertRegex(printed, r"overlap wrote no \S*written/mesh.csv, which {out} stands for in \[run\] of \S*overlap.toml")

@@ -87,6 +87,8 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
     // Meshing may take an hour: refuse an unusable directory before it starts.
+    files::register_input(&arguments.case)
+        .map_err(|source| Error::Read { path: arguments.case.clone(), source })?;
     for path in [&arguments.out, &arguments.json].into_iter().flatten() {
         files::name_output(path).map_err(|source| Error::Write { path: path.clone(), source })?;
     }

@@ -323,8 +323,8 @@ fn a_mesh_that_depends_on_what_it_must_not_is_reported() {
 /// An engine that copies a forest of p4est, and whose run report, of rank 0 alone, has neither a digest nor a number of ranks.
 const FOREST: &str = r#"
 [run]
-serial = ["sh", "{here}/copy"]
-parallel = ["{launcher}", "sh", "{here}/copy"]
+serial = ["sh", "{here}/copy", "{case}"]
+parallel = ["{launcher}", "sh", "{here}/copy", "{case}"]
 out = ["{out}.p8est"]
 json = ["{json}"]
 format = "p4est"
@@ -341,7 +341,7 @@ fn copying(fixture: &Fixture, sample: &str) {
         std::fs::read_to_string(format!("{samples}/{sample}.csv")).unwrap().lines().count() - 1;
     let script = format!(
         "echo run >> ${{0%/*}}/seen\nfor file; do case $file in *.p8est) cp {samples}/{sample}.p8est $file ;; \
-         *) echo '{{\"cells\": {cells}}}' > $file ;; esac; done\n"
+         *.json) echo '{{\"cells\": {cells}}}' > $file ;; esac; done\n"
     );
     fixture.write("copy", &script);
 }

@@ -34,11 +34,19 @@ pub struct About {
     #[arg(long, value_name = "NAME", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub author: String,
     /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
-    #[arg(long, value_name = "SPDX|URL", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    #[arg(long, value_name = "SPDX|URL", value_parser = licence)]
     pub licence: String,
     /// The day, such as `2026-01-31`
     #[arg(skip = now_utc()[.."2026-01-31".len()].to_owned())]
     pub day: String,
+}
+
+/// An address, or an identifier, which becomes part of one.
+fn licence(given: &str) -> Result<String, &'static str> {
+    let marks = if given.contains("://") { "-.+:/_~%#?=&" } else { "-.+" };
+    let fits = |c: char| c.is_ascii_alphanumeric() || marks.contains(c);
+    let why = "it is no identifier of https://spdx.org/licenses, such as CC-BY-4.0, and no address";
+    if !given.is_empty() && given.chars().all(fits) { Ok(given.to_owned()) } else { Err(why) }
 }
 
 /// The metadata: files with their sizes, sessions with command, machine and time, programs with their digests.
@@ -126,6 +134,16 @@ mod tests {
     use super::*;
     use bench::experiments::entry::{Comm, Entry, Machine, Session};
     use bench::testing::{line, run};
+
+    #[test]
+    fn a_licence_that_would_be_no_address_is_refused() {
+        for good in ["CC-BY-4.0", "GPL-2.0+", "https://a.b/c_d~e?f=1#g"] {
+            assert_eq!(licence(good).unwrap(), good);
+        }
+        for wrong in ["", "CC BY 4.0", "MIT OR Apache-2.0", "file:// a", "(c) me", "a/b"] {
+            assert!(licence(wrong).unwrap_err().contains("spdx.org"), "{wrong}");
+        }
+    }
 
     #[test]
     fn every_entity_that_is_named_is_described() {

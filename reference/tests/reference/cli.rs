@@ -64,8 +64,10 @@ fn words(directory: &Path) -> Vec<u64> {
 }
 
 #[test]
-fn outputs_that_replace_each_other_are_refused() {
+fn outputs_that_replace_each_other_or_the_case_are_refused() {
     let directory = directory_with_case(CASE);
+    let message = assert_fails(directory.path(), &["case.toml", "--out", "case.toml"], 2);
+    assert!(message.contains("this run also reads it"), "{message}");
     for json in ["new/mesh", "new/mesh/mesh.json"] {
         let arguments = ["case.toml", "--out", "new/mesh", "--json", json];
         let message = assert_fails(directory.path(), &arguments, 2);
@@ -250,7 +252,8 @@ fn output_that_cannot_be_written_exits_with_4() {
         "an empty directory is accepted"
     );
     assert!(assert_fails(path, &["case.toml", "--out", "empty"], 2).contains("not empty"));
-    assert!(assert_fails(path, &["case.toml", "--out", "case.toml"], 4).contains("case.toml"));
+    fs::write(path.join("file"), "").unwrap();
+    assert!(assert_fails(path, &["case.toml", "--out", "file"], 4).contains("file"));
     assert!(
         assert_fails(path, &["case.toml", "--out", "case.toml/mesh"], 4).contains("cannot write")
     );

@@ -150,20 +150,21 @@ impl Rules {
 
     /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
     fn check(&self) -> Result<(), String> {
-        let TimeRules { alpha, effect_min, rounds_min: fewest, rounds_max, .. } = self.time;
-        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0;
+        let TimeRules { alpha, rounds_min: fewest, rounds_max, .. } = self.time;
+        let TimeRules { effect_min, effect_wanted, budget_s, .. } = &self.time;
+        let is_level = alpha > 0.0 && alpha < 0.5;
         let least = if is_level { rounds_min(alpha) } else { 0 };
         let few = format!(
             "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
         );
         let Tolerance { counters, instructions, memory, of } = &self.tolerance;
-        let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
-        let are_percentages = tolerances.all(|percent| (0.0..=1e6).contains(percent));
+        let numbers = [counters, instructions, memory, effect_min, effect_wanted, budget_s];
+        let are_ordinary = numbers.into_iter().chain(of.values()).all(|n| (0.0..=1e6).contains(n));
         refuse(&[
-            (!is_level, "alpha must be between 0 and 0.5, and effect_min at least 0"),
+            (!is_level, "alpha must be between 0 and 0.5"),
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
-            (!are_percentages, "a tolerance must be between 0 and 1000000 percent"),
+            (!are_ordinary, "tolerances, effects and budget_s must be between 0 and 1000000"),
         ])?;
         for (i, case) in self.cases.iter().enumerate() {
             let is_second = self.cases[..i].iter().any(|other| other.name == case.name);
@@ -258,6 +259,12 @@ mod tests {
         let wrong = |text: &str| read(&format!("{text}\n{case}")).unwrap_err();
         assert!(wrong("[time]\nrounds_min = 3").contains("rounds_min"));
         assert!(wrong("[time]\nalpha = 0.0").contains("alpha"));
+        // An effect that none exceeds would make every time unchanged.
+        for key in
+            ["effect_min = inf", "effect_wanted = nan", "effect_min = -1.0", "budget_s = nan"]
+        {
+            assert!(wrong(&format!("[time]\n{key}")).contains("effects and budget_s"), "{key}");
+        }
         assert!(wrong(case).contains("case a is there twice"));
         assert!(wrong(&format!("{}ranks = [1]", case.replace("'a'", "'b'"))).contains("below 2"));
         assert!(wrong("[[case]]\nname = 'b'\nlayers = []").contains("case b has no layers"));

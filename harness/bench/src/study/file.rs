@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 /// Valid numbers of cells.
 const CELLS: RangeInclusive<f64> = 1e3..=1e12;
+const WRONG_LAYERS: &str = "a layer has at least one cell";
 const WRONG_CELLS: &str = "cells is from 1e3 to 1e12";
 /// Valid numbers of facets per rank.
 const FACETS: RangeInclusive<usize> = 1..=100_000_000;
@@ -306,8 +307,9 @@ impl Study {
             let why = format!("the cases {other} and {case} have the same name: rename one");
             refuse(&[(other != case, &why)])?;
         }
-        for (name, Mesh { spacing_min, cells, .. }) in &self.mesh {
+        for (name, Mesh { spacing_min, cells, layer_cells_min, .. }) in &self.mesh {
             refuse(&[
+                (*layer_cells_min == Some(0), WRONG_LAYERS),
                 (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
                 (!cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
                 (spacing_min.is_some_and(|s| !s.is_normal() || s < 0.0), "spacing_min is positive"),
@@ -437,13 +439,15 @@ impl Series {
             series_cells,
             ..Setup::serial(&self.name(), spacing, n)
         };
-        each.flat_map(|at| self.choices().iter().map(move |of| of_choice(at, of))).collect()
+        // What is named twice is no repetition.
+        distinct(each.flat_map(|at| self.choices().iter().map(move |of| of_choice(at, of))))
     }
 
     /// Each series that it is, with its cells.
     pub(super) fn sizes(&self) -> impl Iterator<Item = (&Self, Option<f64>)> {
         let own = self.cells.is_empty().then_some(None);
-        self.cells.iter().copied().map(Some).chain(own).map(move |cells| (self, cells))
+        let sizes = distinct(self.cells.iter().copied().map(Some).chain(own));
+        sizes.into_iter().map(move |cells| (self, cells))
     }
 
     /// Returns the partitions that are compared.
@@ -475,6 +479,7 @@ impl Series {
         let wrong = [
             (!ranks.iter().all(|ranks| RANKS.contains(ranks)), "ranks are from 1 to 65536"),
             (self.repeats == 0, "repeats is at least 1"),
+            (self.layers.contains(&0), WRONG_LAYERS),
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
             (

@@ -226,7 +226,7 @@ impl Session<'_> {
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>> {
         let base = self.base(&series.case, None)?;
         let (n, mut points) = (base.layer_cells_min, Vec::new());
-        for engine in &series.engines {
+        for engine in &crate::order::distinct(series.engines.clone()) {
             let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
             if layouts.is_empty() {
@@ -455,7 +455,8 @@ mod tests {
         let at = |name: &str| place.path().join(name);
         let put = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
         put("cube.toml", CUBE);
-        let run = "[run]\nserial = ['{program}']\nout = ['{out}']\n[limits]\nfacets_max = 1\n";
+        let run =
+            "[run]\nserial = ['{program}', '{case}']\nout = ['{out}']\n[limits]\nfacets_max = 1\n";
         put("few.toml", &format!("about = 'x'\nprogram = '{{here}}/none'\n{run}"));
         put("study.toml", series);
         let study = Study::read(&at("study.toml")).unwrap();
@@ -473,7 +474,8 @@ mod tests {
     /// A mesh of the first series is known in the second, and is declined again.
     #[test]
     fn a_mesh_that_a_program_declines_is_left_out_of_every_series() {
-        let series = "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few']\n";
+        let series =
+            "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few', 'few']\n";
         let lines = lines_of(&series.repeat(2));
         let is_left_out = |line: &Line| match &line.entry {
             Entry::LeftOut(left) => left.why.contains("facets_max"),

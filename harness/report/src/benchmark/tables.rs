@@ -39,7 +39,8 @@ pub fn causes(groups: &Groups) -> Vec<String> {
         let (subject, experiment, division) = (Subject::of(s), &s.experiment, s.division());
         format!("{subject}, {experiment}, {division}, {cells} cells, {how}: {cause}")
     };
-    groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
+    let all: Vec<_> = groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect();
+    if all.is_empty() { vec!["no run is on several ranks".to_owned()] } else { all }
 }
 
 /// Time, load imbalance λ = max/mean, POP efficiencies, rate and memory of every group.
@@ -243,6 +244,8 @@ mod tests {
         assert_eq!(value("global\nefficiency"), "0.800");
         assert!(table.notes[0].contains(UNKNOWN), "{:?}", table.notes);
         assert!(causes(&groups)[0].ends_with(UNKNOWN), "{:?}", causes(&groups));
+        let none = text(&Groups::of(&lines[..1]));
+        assert!(none.ends_with("efficiency\n  no run is on several ranks\n"), "{none}");
     }
 
     fn by(engine: &str, cells: u64, phase: &str) -> Line {

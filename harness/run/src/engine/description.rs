@@ -247,8 +247,12 @@ mod tests {
         assert_eq!(least.run.serial, ["{program}", "{case}", "{out}"]);
         assert_eq!(least.run.parallel[1], "{program}");
         assert!(least.run.always_writes_mesh() && least.promises.definition);
+        let least_with = |case| format!("[run]\nserial = ['meshit']\nout = [{case}'{{out}}']\n");
         let nowhere = Description::parse("[run]\nserial = ['meshit', '{case}']").unwrap_err().why;
         assert!(nowhere.contains("`serial` has no {out}"), "{nowhere}");
+        let of_any = Description::parse(&least_with("")).unwrap_err().why;
+        assert!(of_any.contains("`serial` has no {case}"), "{of_any}");
+        assert!(Description::parse(&least_with("'{case}', ")).is_ok());
     }
 
     #[test]

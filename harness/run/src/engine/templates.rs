@@ -119,6 +119,9 @@ impl Templates {
                  key `out`, as in out = [\"--out\", \"{{out}}\"]"
             );
             Failure::unless(!needs_out || has("{out}"), why)?;
+            let is_given = has("{case}") || self.out.concat().contains("{case}");
+            let why = format!("`{key}` has no {{case}}: add it, as in [\"mine\", \"{{case}}\"]");
+            Failure::unless(is_given, why)?;
         }
         check_known("serve", &self.serve, &[])?;
         self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of, &["case", key]))

@@ -118,6 +118,7 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     assert_eq!(growing.series[1].name(), "cube-80-facets-per-rank");
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
+        ("sim", "layers = [2, 0]\nsim", "a layer has at least one cell"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
         ("cells = [1e4]", "", "give the cells of a rank"),
         ("sim", "facets = 80\nsim", "facets per rank are for weak"),
@@ -134,6 +135,17 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
 }
 
 #[test]
+fn what_is_named_twice_is_no_repetition() {
+    let text = "[[series]]\nexperiment = 'layers'\ncase = 'cube'\ncells = [1e4, 1e4]\nsim = [1, 2, 1]\nlayers = [1, 1]\n";
+    let series = &read(text).unwrap().series[0];
+    let layouts = series.layouts(
+        &Description::parse(include_str!("../../../../engines/mesher.toml")).unwrap(),
+        true,
+    );
+    assert_eq!((series.sizes().count(), series.setups("mesher", None, 4, &layouts).len()), (1, 2));
+}
+
+#[test]
 fn contradictions_are_reported() {
     for (from, to, why) in [
         ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
@@ -146,6 +158,7 @@ fn contradictions_are_reported() {
         ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
         ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
         ("spacing_min = 0.1", "spacing_min = 0.0", "mesh cube: spacing_min is positive"),
+        ("spacing_min = 0.1", "layer_cells_min = 0", "mesh cube: a layer has at least one cell"),
         ("case = \"cube-small\"", "", "missing field"),
         ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
         ("at_least", "atleast", "unknown field"),
