@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
         fs::remove_dir_all(mesh)?;
         Ok(tree)
     };
-    let of_case = Cell::new(None);
+    let (of_case, mut unexamined) = (Cell::new(None), None);
     let make = |level| match of_case.take() {
         Some(words) if level == case.level_surface => Ok(words),
         _ => Ok(tree(level)?.words),
@@ -81,7 +81,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             of_case.set(Some(words));
             let is_flow = case.keep == Keep::Outside && case.seeds.is_empty();
             let cut = if is_flow { leaks.cut()? } else { Vec::new() };
-            let leaked = leaked(&case, &manifest, cut.is_empty())?;
+            let leaked = leaked(&case, &manifest);
+            unexamined = leaked.as_ref().err().filter(|_| !cut.is_empty()).cloned();
+            let leaked = if unexamined.is_some() { Vec::new() } else { leaked? };
             let regions = leaks.regions(&leaked)?.into_iter();
             // Seeds lie in the flow, into which the region leaked.
             let seed = |from| Ok((from, leaks.seed(Target::Point(from))?));
@@ -102,28 +104,29 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     print!("{answers}");
     let is_leak = answers.examined.iter().any(|report| report.is_leak);
     let code = if is_leak { EXIT_FAILED } else { EXIT_HOLDS };
-    put_forms(code, &[(arguments.json.as_deref(), &|| pretty(&answers))], None)
+    let code = put_forms(code, &[(arguments.json.as_deref(), &|| pretty(&answers))], None)?;
+    unexamined.map_or(Ok(code), |why| Err(why.into()))
 }
 
 /// What to do where there is no start.
 const START: &str = "give a start with --from X,Y,Z, in the space that should be closed";
 
-/// What leaked between coarser spacings and the case's, as the mesher reports it. If nothing else is examined, there must be something that may.
-fn leaked(case: &Case, manifest: &Manifest, is_all: bool) -> Result<Vec<Leak>, String> {
+/// What leaked between coarser spacings and the case's, as the mesher reports it, if there is something that may.
+fn leaked(case: &Case, manifest: &Manifest) -> Result<Vec<Leak>, String> {
     let leaks = manifest.leaks.clone();
     let leaks = leaks.ok_or_else(|| format!("the program does not report leaks: {START}"))?;
     let sides = manifest.leaves_by_side;
     // Seeds lie in the flow, and what they do not reach has the other side.
     let is_flow_inside = case.keep == Keep::Inside && !case.seeds.is_empty();
     let closed = if is_flow_inside { sides.outside } else { sides.inside };
-    if is_all && leaks.is_empty() && closed == 0 {
+    if leaks.is_empty() && closed == 0 {
         let fact = match case.seeds.is_empty() {
             true => {
                 "no leaf is inside by its rays at this spacing, as where an opening is wider than four cells or every facet appears twice"
             }
             false => "the flow of the seeds reaches all leaves at this spacing",
         };
-        return Err(format!("{fact}, so there is nothing to examine: {START}"));
+        return Err(format!("{fact}, so there is no closed space to examine: {START}"));
     }
     Ok(leaks)
 }

@@ -55,11 +55,8 @@ pub struct Leaks<'a, F> {
     facets: FacetTree,
     /// Makes the sorted leaf words of the case's base tree at a surface level.
     make: F,
-    /// Those that were made, with all that is outside at the root's boundary but the largest space taken for inside: the far field is one space,
-    /// and the root may cut others, such as the cavity of a half model.
+    /// Those that were made.
     trees: BTreeMap<u8, Vec<u64>>,
-    /// The leaves of these others in the case's own tree, by index.
-    cut: Vec<Vec<u32>>,
 }
 
 impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
@@ -71,7 +68,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         let why = "the case has no facets, so nothing separates places";
         Failure::unless(!case.facets.is_empty(), why)?;
         let facets = FacetTree::new(&case.facets_lattice);
-        Ok(Self { case, facets, make, trees: BTreeMap::new(), cut: Vec::new() })
+        Ok(Self { case, facets, make, trees: BTreeMap::new() })
     }
 
     /// Answers for pairs of places, with their invariants checked.
@@ -97,19 +94,21 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         let spacing = Spacing::of(level, root);
         let (widest, outside) = self.leaks(level, ends)?;
         let (is_leak, closes, passage) = (widest.is_some(), None, None);
-        let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
-        let is_enclosed = !is_leak && to == Target::Far && is_outside && self.case.seeds.is_empty();
-        let is_cut = to == Target::Far && self.is_cut(start);
+        let is_outside = |words: &[u64]| word::side(leaf_at(words, start)) == Side::Outside;
+        let is_by_rays = to == Target::Far && self.case.seeds.is_empty();
+        let is_apart = is_by_rays && !is_leak && is_outside(&self.trees[&level]);
+        let is_cut = is_apart && !is_outside(&self.without_cut(level)?);
+        let is_enclosed = is_apart && !is_cut;
         let mut found = Report { from, to, spacing, is_leak, is_enclosed, is_cut, closes, passage };
         if let Some(finest) = widest {
             // The widest opening is as wide as the leaves of a path, or 4 times those two levels below. There its ball's centre lies in
             // free leaves: no finer tree has a wider path. The coarsest tree that joins the ends may do so through the finer cells of a
             // box, and close a wider opening.
+            let outside = outside.as_deref();
             found.closes = self.coarsen(ends, outside, finest)?;
             for measured in level.min(finest + 2)..=level {
                 self.make_tree(measured)?;
                 progress("measuring the width");
-                let outside = outside.map(|level| &self.trees[&level][..]);
                 let words = &self.trees[&measured];
                 let space = Space::new(words, &self.facets, outside)?;
                 let passage = passage::widest((self.case, measured), space, ends)?;
@@ -127,24 +126,19 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
         Ok(found)
     }
 
-    /// What [`Self::search`] finds in a base tree; and the level whose outside is the far field, if that is not all of the root's boundary.
-    fn leaks(&mut self, level: u8, ends: Ends) -> Result<(Option<u8>, Option<u8>)> {
+    /// What [`Self::search`] finds in a base tree; and the words whose outside is the far field, if that is not all of the root's boundary.
+    fn leaks(&mut self, level: u8, ends: Ends) -> Result<(Option<u8>, Option<Vec<u64>>)> {
         let joined = self.search(level, ends, None)?;
         let is_far = joined.is_some() && ends.1.is_none();
         let outside = if is_far { self.closed(ends.0)? } else { None };
-        Ok((if outside.is_some() { self.search(level, ends, outside)? } else { joined }, outside))
+        let Some(far) = &outside else { return Ok((joined, None)) };
+        Ok((self.search(level, ends, Some(far))?, outside))
     }
 
     fn make_tree(&mut self, level: u8) -> Result<()> {
         if !self.trees.contains_key(&level) {
             progress(&format!("meshing the base tree of level {level}"));
-            let mut words = (self.make)(level)?;
-            let cut = Space::new(&words, &self.facets, None)?.cut();
-            cut.iter().flatten().for_each(|&cell| words[cell as usize] |= Side::Inside as u64);
-            if level == self.case.level_surface {
-                self.cut = cut;
-            }
-            self.trees.insert(level, words);
+            self.trees.insert(level, (self.make)(level)?);
         }
         Ok(())
     }
@@ -162,57 +156,70 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>>> Leaks<'a, F> {
     pub fn cut(&mut self) -> Result<Vec<[f64; 3]>> {
         self.make_tree(self.case.level_surface)?;
         let (root, words) = (&self.case.root, &self.trees[&self.case.level_surface]);
-        let leaf = |&cell: &u32| word::octant(words[cell as usize]);
-        let largest = |of: &Vec<u32>| of.iter().map(leaf).min_by_key(|leaf| leaf.level);
-        let largest = self.cut.iter().filter_map(largest);
+        let leaf = |cell: u32| word::octant(words[cell as usize]);
+        let largest = |of: Vec<u32>| of.into_iter().map(leaf).min_by_key(|leaf| leaf.level);
+        let largest = Space::new(words, &self.facets, None)?.cut().into_iter().filter_map(largest);
         Ok(largest.map(|leaf| root.rounded(root.to_user(leaf.centre()))).collect())
     }
 
-    /// Whether a place lies in such a space.
-    fn is_cut(&self, at: Point) -> bool {
-        let Some(words) = self.trees.get(&self.case.level_surface) else { return false };
-        let leaf = leaf_at(words, at);
-        self.cut.iter().flatten().any(|&cell| words[cell as usize] == leaf)
+    /// The words of a base tree, in which all that is outside at the root's boundary but the largest space is inside: the root may cut others
+    /// off the far field, such as the cavity of a half model.
+    fn without_cut(&mut self, level: u8) -> Result<Vec<u64>> {
+        self.make_tree(level)?;
+        let mut words = self.trees[&level].clone();
+        let cut = Space::new(&words, &self.facets, None)?.cut();
+        cut.iter().flatten().for_each(|&cell| words[cell as usize] |= Side::Inside as u64);
+        Ok(words)
     }
 
-    /// The finest coarser level at which the start is inside, or the case's if the root cuts it off there, if part of the root's boundary is
-    /// outside at this level. The root may cut the body, so only that part is the far field.
-    fn closed(&mut self, start: Point) -> Result<Option<u8>> {
-        for level in (0..self.case.level_surface + u8::from(self.is_cut(start))).rev() {
+    /// The words of the finest coarser base tree in which the start is inside, and part of the root's boundary outside: the root may cut the
+    /// body, so only that part is the far field. Without one, those of the finest tree in which the root cuts the start off the far field.
+    fn closed(&mut self, start: Point) -> Result<Option<Vec<u64>>> {
+        let is_inside = |words: &[u64]| word::side(leaf_at(words, start)) == Side::Inside;
+        let is_far = |&w: &u64| word::side(w) == Side::Outside && word::octant(w).is_at_boundary();
+        for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let words = &self.trees[&level];
-            if word::side(leaf_at(words, start)) == Side::Inside {
-                let is_far =
-                    |&w: &u64| word::side(w) == Side::Outside && word::octant(w).is_at_boundary();
-                return Ok(words.iter().any(is_far).then_some(level));
+            if is_inside(words) && words.iter().any(is_far) {
+                return Ok(Some(words.clone()));
+            }
+        }
+        for level in (0..=self.case.level_surface).rev() {
+            let words = self.without_cut(level)?;
+            if is_inside(&words) && !is_inside(&self.trees[&level]) {
+                return Ok(Some(words));
             }
         }
         Ok(None)
     }
 
     /// The level of the finest leaves on the path that joins the ends through the coarsest free leaves of a base tree; none if no path does.
-    /// The ends lie in free leaves. The far field is what is `outside` at that level, if there is one.
-    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<Option<u8>> {
+    /// The ends lie in free leaves. The far field is what is outside by the words `outside`, if there are any.
+    fn search(&self, level: u8, ends: Ends, outside: Option<&[u64]>) -> Result<Option<u8>> {
         progress(&format!("searching the base tree of level {level}"));
-        let outside = outside.map(|level| &self.trees[&level][..]);
         let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
         let widest = space.widest(ends, f32::INFINITY, edge)?;
         Ok(widest.map(|(_, edge)| (UNITS_PER_EDGE as f32 / edge).log2() as u8))
     }
 
-    /// Coarsens the surface until the ends are not joined; at the case's spacing, leaves of the level `finest` or coarser join them. If facets
+    /// Coarsens the surface until the ends are not joined; at the case's spacing, leaves of the level `depth` or coarser join them. If facets
     /// then cross only the leaves of the ends, and finer ones joined them before, those of a box, no spacing closes the opening.
-    fn coarsen(&mut self, ends: Ends, far: Option<u8>, mut finest: u8) -> Result<Option<Closes>> {
+    fn coarsen(
+        &mut self,
+        ends: Ends,
+        far: Option<&[u64]>,
+        mut depth: u8,
+    ) -> Result<Option<Closes>> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let is_end_crossed = self.crossed(level, ends).is_some();
             let joined = if is_end_crossed { None } else { self.search(level, ends, far)? };
             let Some(leaves) = joined else {
                 let at = Closes { spacing: Spacing::of(level, &self.case.root), is_end_crossed };
-                return Ok((!is_end_crossed || finest <= level + 1).then_some(at));
+                return Ok((!is_end_crossed || depth <= level + 1).then_some(at));
             };
-            finest = leaves;
+            depth = leaves;
         }
         Ok(None)
     }

@@ -7,6 +7,7 @@ use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::octant::Octant;
 use contract::testing::{assert_text, base_tree};
+use contract::word;
 use geometries::{Generator, Shape};
 use geometry::leak::Leaks;
 use geometry::leak::Target;
@@ -290,6 +291,32 @@ fn a_cavity_that_only_the_roots_boundary_opens_is_flow_and_no_leak() {
     let case = case_in(Root { origin: [0.07, -4.13, -4.07], edge: 8.0 }, &body.facets, 7);
     let report = ask(&case, [0.3, 0.0, 0.0], Target::Far).unwrap();
     assert_describes(&report, &body, "a hole in a body that the root cuts");
+}
+
+/// A wall through the root divides its boundary into two spaces, and the body is in the smaller one: what its hole lets in is flow, too.
+#[test]
+fn a_body_that_leaks_into_a_space_that_a_wall_cuts_off_leaks() {
+    let mut body = hole(0.2);
+    let wall = |sign: f32| {
+        [[-10.0, -10.0], [10.0, 10.0], [10.0 * sign, -10.0 * sign]].map(|[y, z]| [3.5, y, z])
+    };
+    body.facets.extend([wall(1.0), wall(-1.0)]);
+    let case = case_in(Root { origin: [-3.91, -8.13, -8.07], edge: 16.0 }, &body.facets, 8);
+    let is_within = |word| {
+        let at = case.root.to_user(word::octant(word).centre());
+        !word::is_crossing(word) && at.iter().all(|c| c.abs() < 1.0)
+    };
+    let tree = |level| {
+        let mut words = base_tree(&case.facets_lattice, |_| level);
+        // The hole is closed there.
+        words.iter_mut().filter(|w| level < 6 && is_within(**w)).for_each(|w| *w |= 1);
+        Ok(words)
+    };
+    let mut leaks = Leaks::new(&case, tree).unwrap();
+    assert_eq!(leaks.cut().unwrap().len(), 1);
+    let report = leaks.answers(&[([0.1; 3], Target::Far)]).unwrap().examined.remove(0);
+    assert!(!report.is_cut, "{report}");
+    assert_describes(&report, &body, "a hole in a body beside a wall");
 }
 
 #[test]
