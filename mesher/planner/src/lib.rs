@@ -90,8 +90,10 @@ const CELLS_MOMENT: f64 = 8.4e6;
 const TREE_BYTES_PER_CELL: f64 = 0.055;
 /// CPU time to write the leaf word of a cell, in seconds, and its part of the tree.
 const TIMES_WRITTEN_S: [f64; 2] = [4e-9, 2.5e-9];
-/// Bytes of the header of a file of leaf words, and of the tree's file but for its cells.
-const HEADERS: [u64; 2] = [128, 1850];
+/// Bytes of the header of a file of leaf words.
+const WORDS_HEADER: u64 = 128;
+/// Bytes of the tree's file but for its cells.
+const TREE_HEADER: u64 = 1850;
 
 /// What a plan is made for. The functions of this type are collective.
 struct Problem<'a> {
@@ -245,8 +247,8 @@ impl<'a> Problem<'a> {
             cells: cells as u64,
             time_cpu_s: before + pilot.at(0).time_cpu_s() + written * cells,
             memory_peak_bytes: ranks.peaks(&ranks.growth(&pilot.at(0))),
-            words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + HEADERS[0],
-            tree_bytes: (cells * self.tree_bytes_per_cell) as u64 + HEADERS[1],
+            words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + WORDS_HEADER,
+            tree_bytes: (cells * self.tree_bytes_per_cell) as u64 + TREE_HEADER,
             tightest: tightest_at(0),
             fits: fitting == Some(0),
             spacing_factor_fits: fitting.filter(|s| *s > 0).map(|s| 2f64.powi(s as i32)),

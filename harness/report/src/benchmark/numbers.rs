@@ -132,7 +132,7 @@ pub struct Checked {
 /// Compares the numbers of a LaTeX text with the results of a record.
 pub fn check(text: &str, numbers: &[Number]) -> Checked {
     let mut found: Vec<(usize, Option<String>)> = Vec::new();
-    let code = without_comments(&without(r"(?m)^.*% not a result\s*$", text));
+    let code = without_comments(&without(r"(?m)^(?:.*[^\\\n])?% not a result\s*$", text));
     for definition in all(r"(?m)^\s*\\defresult.*$", &code) {
         found.push((definition.start(), defines_otherwise(definition.as_str(), numbers)));
     }
@@ -375,6 +375,7 @@ mod tests {
             ("\\textcolor[rgb]{1,0,0}{9.87}", "9.87 is written by hand"),
             ("\\scalebox{0.555}{9.87}", "9.87 is written by hand"),
             ("1.89 % not a result\n9.87 % no result", "line 2: 9.87 is written by hand"),
+            ("9.87\\% not a result", "9.87 is written by hand"),
             ("10.1137/9 s", "10.1137 is written by hand"),
             ("\\newcommand{\\a}{9.87}", "9.87 is written by hand"),
             ("\\cite{a} [9.87,\n1.23] = [b]", "9.87 is written by hand"),
