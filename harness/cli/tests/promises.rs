@@ -515,11 +515,11 @@ fn what_could_not_be_tried_is_not_green() {
     let fixture = Fixture::new();
     fixture.engine("right", "complete = true");
     let engine = fs::read_to_string(fixture.path("foreign.toml")).unwrap();
-    fixture.script("copy", "#!/bin/sh\ncp \"$0\" \"$1\"\n");
+    fixture.script("copy", "#!/bin/sh\ncp \"$0\" \"$2\"\n");
     for (engine, why) in [
         (
             engine
-                .replace("engine\", \"{case}\", \"{out}", "copy\", \"{out}.vtu")
+                .replace("engine\", \"{case}\", \"{out}", "copy\", \"{case}\", \"{out}.vtu")
                 .replace("[run]", "[run]\nformat = 'vtk'"),
             "which needs Python at ",
         ),

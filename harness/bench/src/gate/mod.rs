@@ -19,7 +19,7 @@ use crate::emptied;
 use crate::experiments::machine;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use contract::failure::Result;
+use contract::failure::{Failure, Result};
 use measures::{LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
 use rules::GateCase;
@@ -91,6 +91,8 @@ struct Bench<'a> {
 pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
     let start = Instant::now();
     let default = programs.paths.root.join("harness/engines/gate.toml");
+    let why = "the rules of the repository are missing: give --rules FILE, or set HARNESS_ROOT to the repository";
+    Failure::unless(options.rules.is_some() || default.is_file(), why)?;
     let rules = Rules::read(options.rules.as_deref().unwrap_or(&default))?;
     let cases = rules.select(&options.case, programs)?;
     let engine = &programs.engine;

@@ -3,7 +3,7 @@
 mod fixture;
 mod targets;
 
-use fixture::Fixture;
+use fixture::{Fixture, Outcome};
 use std::fs;
 use std::process::Command;
 
@@ -509,8 +509,8 @@ fn rules_that_cannot_be_followed_are_refused() {
     for (wrong, code, why) in [
         (also("missing.toml"), 2, "missing.toml"),
         (also("invalid.toml"), 2, "invalid.toml"),
-        (format!("[tolerance]\nmemory = -1.0\n{rules}"), 2, "a tolerance must be between 0 and"),
-        (format!("[tolerance.of]\nwords = nan\n{rules}"), 2, "a tolerance must be between 0 and"),
+        (format!("[tolerance]\nmemory = -1.0\n{rules}"), 2, "effects and budget_s must"),
+        (format!("[tolerance.of]\nwords = nan\n{rules}"), 2, "effects and budget_s must"),
         (
             format!("[tolerance.of]\nwords = 5.0\n'2 ranks/words' = 1.0\n{rules}"),
             0,
@@ -523,6 +523,8 @@ fn rules_that_cannot_be_followed_are_refused() {
         let has = outcome.printed.contains(why);
         assert!(outcome.code == code && has, "{wrong}: {}", outcome.printed);
     }
+    let Outcome { code, printed } = fixture.harness("gate --engine engine.toml --baseline engine");
+    assert!(code == 2 && printed.contains("give --rules FILE"), "{code}: {printed}");
 }
 
 #[test]
