@@ -120,7 +120,7 @@ class EnginesTest(unittest.TestCase):
         write, extension, more = FORMATS[kind]
         path = self.at / f"{name}{extension}"
         write(path, corner, *mesh)
-        words = json.dumps(["cp", "-r", str(path), "{out}" + extension])
+        words = json.dumps(["sh", "-c", 'cp -r "$1" "$2"', "{case}", str(path), "{out}" + extension])
         (self.at / f"{name}.toml").write_text(f'[run]\nserial = {words}\nformat = "{kind}"\n{more}{TAKES}{PROMISES}')
         code, printed, error = run("harness", "verify", self.at / "case.toml", "--engine", self.at / f"{name}.toml")
         return code, printed + error
