@@ -236,9 +236,8 @@ impl<'a> Problem<'a> {
     fn plan_of(&self, pilots: Vec<PilotEntry>, pilot: &Pilot, ranks: &Ranks) -> Plan {
         let tightest_at = |shift| ranks.tightest(&ranks.growth(&pilot.at(shift)));
         let fits = |t: Option<Tightest>| t.is_none_or(|t| t.needed_bytes <= t.left_bytes);
-        let Amounts { cells, .. } = pilot.at(0);
         let fitting = (0..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
-        let [before, written] = self.times_s;
+        let ([before, written], cells) = (self.times_s, pilot.at(0).cells);
         let plan = Plan {
             schema: "octree-mesher-plan/2",
             is_without_seeds: false,
