@@ -172,17 +172,20 @@ const PICTURED: &str = r"\\includegraphics\*?\s*(?:\[[^\]]*\]\s*)*\{\s*([^}]*?)\
 /// A macro that stands for a directory.
 const DEFINED: &str = r"\\(?:[a-z]+command\*?|def)\s*\{?\s*(\\[a-zA-Z]+)\s*\}?\s*\{([^{}\\#]*)\}";
 
-/// The texts and the pictures that a text includes, as it names them, with the directories for which it has macros; without those that an
-/// argument of a macro names in such a directory.
+/// The texts and the pictures that a text includes, as it names them, with the directories for which it has macros, as last defined before;
+/// without those that an argument of a macro names in such a directory.
 pub fn included(text: &str) -> [Vec<String>; 2] {
     let code = without_comments(text);
     let [defined, texts, pictures] = [DEFINED, INCLUDED, PICTURED].map(pattern);
-    let value = |of: Captures| [1, 2].map(|part| format!("{}/", &of[part]));
-    let defined: Vec<[String; 2]> = defined.captures_iter(&code).map(value).collect();
+    let place = |of: &Captures| of.get(0).map_or(0, |all| all.start());
+    let value = |of: Captures| (place(&of), [1, 2].map(|part| format!("{}/", &of[part])));
+    let defined: Vec<(usize, [String; 2])> = defined.captures_iter(&code).map(value).collect();
     let name = |of: Captures| -> Option<String> {
         let name: String = of.iter().skip(1).flatten().map(|m| m.as_str()).collect();
         let is_fixed = !(name.starts_with('\\') && name.contains('#'));
-        is_fixed.then(|| defined.iter().fold(name, |name, [from, to]| name.replace(from, to)))
+        let (before, after) = defined.split_at(defined.partition_point(|(at, _)| *at < place(&of)));
+        let values = before.iter().rev().chain(after);
+        is_fixed.then(|| values.fold(name, |name, (_, [from, to])| name.replace(from, to)))
     };
     [texts, pictures].map(|of| of.captures_iter(&code).filter_map(name).collect())
 }
@@ -312,6 +315,9 @@ mod tests {
             assert_eq!(texts, ["x/y/a", r"\offset/b"]);
             assert_eq!(pictures, ["x/y/c.pdf"]);
         }
+        let of_two =
+            r"\input{\of/a}\newcommand{\of}{x}\input{\of/b}\renewcommand{\of}{y}\input{\of/c}";
+        assert_eq!(included(of_two)[0], ["x/a", "x/b", "y/c"]);
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {
