@@ -29,6 +29,7 @@ use run::engine::interrupt;
 use run::engine::paths::Input;
 use run::engine::runner::{Engine, Programs};
 use run::verify::options::whole_seconds;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use subject::{Counted, Subject, top_level};
@@ -140,6 +141,14 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
         }
         layer.time_s = start.elapsed().as_secs_f64();
         report.push(layer);
+    }
+    let measured = report.candidate_measures.cases.values();
+    let numbers = measured.flat_map(|of| [&of.exact, &of.memory, &of.counted]);
+    let names: Vec<&String> = numbers.flat_map(BTreeMap::keys).collect();
+    let is_whole = given.is_empty() && bench.options.case.is_empty();
+    for name in bench.rules.tolerance.unused(&names).into_iter().filter(|_| is_whole) {
+        let why = "no quantity that was measured has this name";
+        crate::announce(&format!("harness gate: the tolerance of {name:?} is not used: {why}"));
     }
     Ok(())
 }

@@ -195,16 +195,26 @@ impl Rules {
 }
 
 impl Tolerance {
+    /// Returns the names in `of` that none of these metrics has: misspelt ones leave their quantity with the tolerance of its layer.
+    pub fn unused(&self, metrics: &[&String]) -> Vec<&str> {
+        let has = |name: &str| metrics.iter().any(|of| *of == name || plain(of) == name);
+        self.of.keys().map(String::as_str).filter(|name| !has(name)).collect()
+    }
+
     /// Returns the tolerated growth of a metric in percent: its own, else that of the layer.
     pub fn of_metric(&self, metric: &str, layer: LayerName) -> f64 {
-        // "4 ranks/messages" is also known as "messages".
-        let plain = metric.rsplit('/').next().unwrap_or(metric);
-        self.of.get(metric).or_else(|| self.of.get(plain)).copied().unwrap_or(match layer {
+        let own = self.of.get(metric).or_else(|| self.of.get(plain(metric)));
+        own.copied().unwrap_or(match layer {
             LayerName::Memory => self.memory,
             LayerName::Instructions => self.instructions,
             _ => self.counters,
         })
     }
+}
+
+/// "4 ranks/messages" is also known as "messages".
+fn plain(metric: &str) -> &str {
+    metric.rsplit('/').next().unwrap_or(metric)
 }
 
 #[cfg(test)]
@@ -233,6 +243,9 @@ mod tests {
         let rules = read(text).unwrap();
         let of = |metric| rules.tolerance.of_metric(metric, LayerName::Memory);
         assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 10.0]);
+        let measured = ["4 ranks/messages", "3 ranks/rays", "rays"].map(str::to_owned);
+        let unused = rules.tolerance.unused(&measured.each_ref());
+        assert_eq!(unused, ["2 ranks/rays"]);
     }
 
     /// Records of two checkouts continue each other.

@@ -298,7 +298,9 @@ impl Study {
     fn check(&self) -> Result<(), String> {
         let is_empty = self.row.is_empty() && self.series.is_empty();
         refuse(&[(is_empty, "it has no [[series]] and no [[row]]")])?;
-        self.series.iter().try_for_each(Series::check)?;
+        for (i, series) in self.series.iter().enumerate() {
+            series.check(&self.series[..i])?;
+        }
         let mut cases = BTreeMap::new();
         let of_series = self.series.iter().map(|series| &series.case);
         for case in of_series.chain(self.mesh.values().map(|mesh| &mesh.case)) {
@@ -472,13 +474,15 @@ impl Series {
         all
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Checks it, after those before it.
+    fn check(&self, before: &[Self]) -> Result<(), String> {
         use Experiment::{Layers, Spacing, Weak, Weights};
         let (what, ranks) = (self.experiment, [&self.sim[..], &self.mpi].concat());
         let is_about_ranks = matches!(what, Weak | Weights);
         let wrong = [
             (!ranks.iter().all(|ranks| RANKS.contains(ranks)), "ranks are from 1 to 65536"),
             (self.repeats == 0, "repeats is at least 1"),
+            (before.contains(self), "it is there twice"),
             (self.layers.contains(&0), WRONG_LAYERS),
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),

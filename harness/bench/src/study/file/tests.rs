@@ -116,8 +116,10 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
     let growing = read(&text.replace("mpi", "facets = 80\nmpi")).unwrap();
     assert_eq!(growing.series[1].name(), "cube-80-facets-per-rank");
+    let twice = format!("[1, 2]\n{}", text.split_inclusive("sim = [1, 2]").next().unwrap());
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
+        ("[1, 2]", &twice, "series strong of cube: it is there twice"),
         ("sim", "layers = [2, 0]\nsim", "a layer has at least one cell"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
         ("cells = [1e4]", "", "give the cells of a rank"),
