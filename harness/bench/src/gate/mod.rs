@@ -145,7 +145,11 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<()> {
     let measured = report.candidate_measures.cases.values();
     let numbers = measured.flat_map(|of| [&of.exact, &of.memory, &of.counted]);
     let names: Vec<&String> = numbers.flat_map(BTreeMap::keys).collect();
-    let is_whole = given.is_empty() && bench.options.case.is_empty();
+    let is_compared =
+        |found: &GateFinding| !matches!(found.verdict, Verdict::LeftOut | Verdict::Missing);
+    let is_made = |of: &Layer| of.left_out.is_none() && of.findings.iter().all(is_compared);
+    let is_whole = given.is_empty() && bench.options.case.is_empty() && !interrupt::requested();
+    let is_whole = is_whole && report.layers.iter().all(is_made);
     for name in bench.rules.tolerance.unused(&names).into_iter().filter(|_| is_whole) {
         let why = "no quantity that was measured has this name";
         crate::announce(&format!("harness gate: the tolerance of {name:?} is not used: {why}"));

@@ -195,7 +195,7 @@ impl Rules {
 }
 
 impl Tolerance {
-    /// Returns the names in `of` that none of these metrics has: misspelt ones leave their quantity with the tolerance of its layer.
+    /// Returns the names in `of` that none of these metrics has: a misspelt name leaves its quantity with the tolerance of its layer.
     pub fn unused(&self, metrics: &[&String]) -> Vec<&str> {
         let has = |name: &str| metrics.iter().any(|of| *of == name || plain(of) == name);
         self.of.keys().map(String::as_str).filter(|name| !has(name)).collect()

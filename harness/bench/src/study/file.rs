@@ -474,7 +474,7 @@ impl Series {
         all
     }
 
-    /// Checks it, after those before it.
+    /// Checks it; `before` are the series before it.
     fn check(&self, before: &[Self]) -> Result<(), String> {
         use Experiment::{Layers, Spacing, Weak, Weights};
         let (what, ranks) = (self.experiment, [&self.sim[..], &self.mpi].concat());
@@ -482,7 +482,7 @@ impl Series {
         let wrong = [
             (!ranks.iter().all(|ranks| RANKS.contains(ranks)), "ranks are from 1 to 65536"),
             (self.repeats == 0, "repeats is at least 1"),
-            (before.contains(self), "it is there twice"),
+            (before.contains(self), "it is given twice"),
             (self.layers.contains(&0), WRONG_LAYERS),
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),

@@ -210,7 +210,8 @@ mod tests {
                     [[row]]\nname = 'r'\nrun = 'one'\nmeasure = 'seconds'\n";
         let file = place.path().join("s.toml");
         let spacing = series("'spacing'\ncells = [4e5]");
-        fs::write(&file, strong.clone() + &strong + &spacing + rows).unwrap();
+        let same = strong.replace("[1, 2]", "[2, 1]");
+        fs::write(&file, strong + &same + &spacing + rows).unwrap();
         let study = Study::read(&file).unwrap();
         let mesh = |ranks: usize, spacing_min: f64, cells| {
             let mut run = run(Comm::Sim, cells, &[("a", &vec![1.0; ranks])]);

@@ -476,7 +476,7 @@ mod tests {
     fn a_mesh_that_a_program_declines_is_left_out_of_every_series() {
         let series =
             "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few', 'few']\n";
-        let lines = lines_of(&series.repeat(2));
+        let lines = lines_of(&format!("{series}{series}repeats = 2\n"));
         let is_left_out = |line: &Line| match &line.entry {
             Entry::LeftOut(left) => left.why.contains("facets_max"),
             _ => false,

@@ -119,7 +119,7 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     let twice = format!("[1, 2]\n{}", text.split_inclusive("sim = [1, 2]").next().unwrap());
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
-        ("[1, 2]", &twice, "series strong of cube: it is there twice"),
+        ("[1, 2]", &twice, "series strong of cube: it is given twice"),
         ("sim", "layers = [2, 0]\nsim", "a layer has at least one cell"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
         ("cells = [1e4]", "", "give the cells of a rank"),
