@@ -158,7 +158,8 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
         let first = boundaries.partition_point(|b| b.0 <= start) - 1;
         let within = boundaries[first..].iter().take_while(|b| b.0 < end);
         let owners: Vec<usize> = within.map(|b| b.1).collect();
-        let (owner, is_full) = (owners[0], l < 2 || owners.len() >= OWNERS_MANY);
+        let (owner, is_full) =
+            (owners[0], ownership.is_everywhere(l) || owners.len() >= OWNERS_MANY);
         (owner, if is_full { (0..comm.size()).collect() } else { owners.into_iter().collect() })
     };
     let mut out = Vec::new();

@@ -92,7 +92,7 @@ impl Gradation<'_> {
             self.close(l, touched);
             if rules.layer_cells_min > 1 {
                 let reached = self.reach(l, rules.layer_cells_min - 1, l - 1);
-                self.split_where_kept(l - 1, reached);
+                self.split_where_kept(self.level_of_sources(l), l - 1, reached);
             }
             // Splits of this level are complete.
             if self.split[l as usize - 1].len() >= BRICKS_MANY {
@@ -106,31 +106,38 @@ impl Gradation<'_> {
     /// Splits the parents of the split octants of level `l`, and those of the octants `touched`, of
     /// level `l - 1`, that are kept. Collective: another rank may own the parent of an octant.
     fn close(&mut self, l: Level, touched: BrickSet) {
-        let split = self.ownership.owned(l, &self.split[l as usize]);
+        let split = self.ownership.sources(l, self.split[l as usize].bricks());
         let parents: BrickSet = split.map(Brick::parents).collect();
         let fresh = parents.without(&self.split[l as usize - 1]);
+        let from = self.level_of_sources(l + 1);
         let ([fresh, touched], sent) =
-            self.ownership.redistribute(l - 1, [fresh, touched], self.comm);
+            self.ownership.redistribute(from, l - 1, [fresh, touched], self.comm);
         self.counters.halo_bricks += sent;
         self.split_more(l - 1, fresh);
         self.split_kept(l - 1, touched);
     }
 
-    /// The octants of level `to`, `l - 1` or `l - 2`, that the sources of level `l` in bricks that this rank owns reach within `radius` cells:
+    /// The level of the sources of level `l`: its leaves, or split octants for whole groups (see above).
+    fn level_of_sources(&self, l: Level) -> Level {
+        if l > self.rules.level_surface { l } else { l - 1 }
+    }
+
+    /// The octants of level `to`, `l - 1` or `l - 2`, that the sources of level `l` on this rank reach within `radius` cells:
     /// kept leaves, or whole groups (see above). Groups without kept leaves are among these: to find them takes as long as to dilate them.
     fn reach(&mut self, l: Level, radius: u32, to: Level) -> BrickSet {
         if l > self.rules.level_surface {
             let mut split = self.split[l as usize].cursor();
             let mut deleted = self.deleted[l as usize].cursor();
-            let leaves = Tree::exists(&self.split, l)
-                .filter(|b| self.ownership.owns(l, b.key))
+            let leaves = self
+                .ownership
+                .sources(l, Tree::exists(&self.split, l))
                 .map(|b| Brick { bits: b.bits & !split.get(b.key) & !deleted.get(b.key), ..b })
                 .filter(|b| b.bits != 0);
             let reached = dilate_children(l - 1, leaves, radius);
             let parents = self.counted(reached);
             return if to < l - 1 { parents.coarsen() } else { parents };
         }
-        let groups = self.ownership.owned(l - 1, &self.split[l as usize - 1]);
+        let groups = self.ownership.sources(l - 1, self.split[l as usize - 1].bricks());
         let radius = radius.div_ceil(2);
         // What is reached is the greatest set of all: its parents are made without it.
         let reached = match to < l - 1 {
@@ -148,10 +155,10 @@ impl Gradation<'_> {
         reached.octants
     }
 
-    /// The paper's exchange of extent boxes: sends the octants that were reached to the ranks that hold
+    /// The paper's exchange of extent boxes: sends the octants that were reached from sources of level `from` to the ranks that hold
     /// them, which split those that are kept. Collective.
-    fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
-        let ([reached], sent) = self.ownership.redistribute(l, [reached], self.comm);
+    fn split_where_kept(&mut self, from: Level, l: Level, reached: BrickSet) {
+        let ([reached], sent) = self.ownership.redistribute(from, l, [reached], self.comm);
         self.counters.halo_bricks += sent;
         self.split_kept(l, reached);
     }
@@ -174,10 +181,10 @@ impl Gradation<'_> {
     /// surface level, which is not 0, that touch a crossing leaf. Collective.
     fn extra_layer(&mut self, surface: Level) {
         for m in (surface..self.crossing.len() as Level).rev() {
-            let leaves = self.ownership.owned(m, &self.crossing[m as usize]);
+            let leaves = self.ownership.sources(m, self.crossing[m as usize].bricks());
             let reached = dilate_children(m - 1, leaves, 1);
             let touched = (surface..m).fold(self.counted(reached), |set, _| set.coarsen());
-            self.split_where_kept(surface - 1, touched);
+            self.split_where_kept(m, surface - 1, touched);
         }
     }
 }

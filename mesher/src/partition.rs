@@ -7,7 +7,7 @@
 //!
 //! Invariants:
 //! - every rank has the same map from the curve to owners, and the intervals of all ranks tile the curve;
-//! - a rank holds a brick if it owns part of it; all ranks hold those with part of nine or more intervals of the curve, and those of levels 0 and 1;
+//! - a rank holds a brick if it owns part of it; all ranks hold those with part of nine or more intervals of the curve, and those of the coarsest levels;
 //! - after [`synchronise_replicas`](ownership::Ownership::synchronise_replicas) all replicas of a brick are equal.
 
 pub mod area;

@@ -32,9 +32,10 @@ static HEAP: Heap = Heap {
 const LINGER: Duration = Duration::from_millis(300);
 
 fn main() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    fix_heap();
     let asked = parse(args_os());
+    let comm = asked.as_ref().map_or(CommChoice::Auto, |args| args.comm);
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    fix_heap(comm);
     let message = match (launch::is_first(), stderr().is_terminal()) {
         (false, _) => "",
         (true, false) => "mesher: interrupted\n",
@@ -45,7 +46,7 @@ fn main() {
     let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
     let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
     abort_on_panic();
-    exit(match choose(asked.as_ref().map_or(CommChoice::Auto, |args| args.comm)) {
+    exit(match choose(comm) {
         #[cfg(feature = "mpi")]
         Ok(CommChoice::Mpi) => run_mpi(&asked),
         Ok(CommChoice::Sim { ranks, seed }) => sim::run(ranks, seed, |comm| obey(&asked, comm))[0],
@@ -57,12 +58,14 @@ fn main() {
 /// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
 /// their own, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
 /// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
-/// needs as much again in every phase (a page fault takes 2 us on a virtual machine). The thread that handles signals needs no heap of its
-/// own, which would take 64 MiB of address space.
+/// needs as much again in every phase (a page fault takes 2 us on a virtual machine). Simulated ranks have a heap each, as ranks in processes
+/// have: in a common one, the lists of free blocks are as long as those of all ranks, and a rank finds what the others have freed, out of its
+/// caches. The thread that handles signals needs none, which would take 64 MiB of address space.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-fn fix_heap() {
+fn fix_heap(comm: CommChoice) {
     use libc::{M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
-    let fixed = [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, 1)];
+    let heaps = if let CommChoice::Sim { ranks, .. } = comm { 2 + ranks as i32 } else { 1 };
+    let fixed = [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, heaps)];
     for (parameter, value) in fixed {
         // SAFETY: `mallopt` only sets a number, under the lock of the heap; any size is valid.
         unsafe { libc::mallopt(parameter, value) };

@@ -2,9 +2,10 @@
 //!
 //! Every rank owns intervals of the Morton curve. A brick fills an octant. If one rank owns all of that octant, the brick is local
 //! to that rank. A brick that straddles a partition boundary is *partially replicated*: every rank that owns part of it holds a
-//! replica, as it has bricks below. If nine or more intervals meet in a brick, or its level is 0 or 1, the brick is *fully
-//! replicated*: all ranks hold a replica. The rank that owns the minimum corner owns the brick: only that rank counts it,
-//! emits its leaves and uses it as a source. A rank that holds a brick holds all bricks above it.
+//! replica, as it has bricks below. If nine or more intervals meet in a brick, or its level is one of the coarsest, the brick is *fully
+//! replicated*: all ranks hold a replica. The rank that owns the minimum corner owns the brick: only that rank counts it and
+//! emits its leaves. It is a source on that rank alone or, on the coarsest levels, on all ranks: to make there what another rank makes, too,
+//! takes less time than to receive it. A rank that holds a brick holds all bricks above it.
 //!
 //! The boundaries between the intervals are all that a rank has to know.
 //!
@@ -48,6 +49,8 @@ pub struct Ownership {
     boundaries: Arc<[Boundary]>,
     /// This rank's longest interval: most queries are for octants within it.
     own: Range<u64>,
+    /// Deepest of the levels whose bricks are all fully replicated.
+    level_everywhere: Level,
     /// Deepest level with a brick of several owners.
     level_replicated: Level,
     /// Deepest level with a fully replicated brick.
@@ -70,11 +73,14 @@ impl Ownership {
         assert!(all.is_sorted_by(|a, b| a.0 < b.0), "boundaries must ascend");
         all.first_mut().expect("every octant must have an owner").0 = 0;
         all.dedup_by_key(|b| b.1);
+        // Around a surface, this level has about as many bricks as there are ranks.
+        let level_everywhere = 1 + ranks.ilog(4);
         let ownership = Self {
             rank: Some(rank),
             ranks,
-            level_replicated: deepest_brick_of(2, &all),
-            level_fully_replicated: deepest_brick_of(OWNERS_MANY, &all),
+            level_everywhere,
+            level_replicated: deepest_brick_of(2, &all).max(level_everywhere),
+            level_fully_replicated: deepest_brick_of(OWNERS_MANY, &all).max(level_everywhere),
             boundaries: all.into(),
             own: 0..0,
         };
@@ -182,7 +188,7 @@ impl Ownership {
     /// Which ranks hold brick `key` of level `l`.
     #[inline]
     pub fn placement(&self, l: Level, key: u64) -> Placement {
-        if l < 2 {
+        if self.is_everywhere(l) {
             return Placement::FullyReplicated;
         }
         let (start, end) = (brick_start(l, key), brick_start(l, key + 1));
@@ -229,6 +235,21 @@ impl Ownership {
         set.bricks().filter(move |b| self.owns(l, b.key))
     }
 
+    /// Whether all ranks hold all bricks of level `l`.
+    pub fn is_everywhere(&self, l: Level) -> bool {
+        l <= self.level_everywhere
+    }
+
+    /// Those of some bricks of level `l` from which this rank makes what they reach.
+    #[inline]
+    pub fn sources(
+        &self,
+        l: Level,
+        all: impl Iterator<Item = Brick>,
+    ) -> impl Iterator<Item = Brick> {
+        all.filter(move |b| self.is_everywhere(l) || self.owns(l, b.key))
+    }
+
     /// Whether several ranks hold a brick of level `l`.
     pub fn is_replicated(&self, l: Level) -> bool {
         self.ranks > 1 && l <= self.level_replicated
@@ -247,8 +268,7 @@ type Extent = [(i64, i64); 3];
 /// Bits of a brick's key; the bits above hold the number of a set.
 pub const KEY_BITS: u32 = 54;
 
-/// The deepest level with a brick in which `n >= 2` intervals or more meet; 1 if none is deeper, as all ranks hold the bricks
-/// of levels 0 and 1.
+/// The deepest level with a brick in which `n >= 2` intervals or more meet; 0 if there is none.
 fn deepest_brick_of(n: usize, boundaries: &[Boundary]) -> Level {
     let spanned = boundaries[1..].windows(n - 1).map(|inner| {
         // The smallest octant that contains the end of the first interval and the start of the last.
@@ -256,7 +276,7 @@ fn deepest_brick_of(n: usize, boundaries: &[Boundary]) -> Level {
         let up = (64 - differ.leading_zeros()).div_ceil(3);
         LEVEL_MAX - up + 2
     });
-    spanned.max().unwrap_or(1)
+    spanned.max().unwrap_or(0)
 }
 
 /// Level-19 Morton code of a brick's minimum corner.

@@ -1,4 +1,4 @@
-//! Parts of sets: finding, removing, sending and uniting them.
+//! Parts of sets: finding, removing and uniting them.
 
 use super::{BrickSet, Run, high_of};
 use crate::brick::Brick;
@@ -30,57 +30,18 @@ impl BrickSet {
         if range == (0..self.len()) {
             return self;
         }
-        self.runs = self.runs_of(&range);
+        if range.is_empty() {
+            return Self::default();
+        }
+        self.runs.retain(|r| r.start < range.end);
+        let before = self.runs.partition_point(|r| r.start <= range.start) - 1;
+        self.runs.drain(..before);
+        self.runs.iter_mut().for_each(|r| r.start = r.start.saturating_sub(range.start));
         self.low.truncate(range.end);
         self.bits.truncate(range.end);
         self.low.drain(..range.start);
         self.bits.drain(..range.start);
         self
-    }
-
-    /// The runs of the bricks at a range of positions, with positions relative to the range.
-    fn runs_of(&self, range: &Range<usize>) -> Vec<Run> {
-        if range.is_empty() {
-            return Vec::new();
-        }
-        let first = self.runs.partition_point(|r| r.start <= range.start) - 1;
-        let runs = self.runs[first..].iter().take_while(|r| r.start < range.end);
-        runs.map(|r| Run { start: r.start.max(range.start) - range.start, ..*r }).collect()
-    }
-
-    /// Appends the bricks at a range of positions to a message: the numbers of runs and bricks, the runs, the lower
-    /// halves of the keys in pairs, and the bits.
-    pub fn pack(&self, range: Range<usize>, words: &mut Vec<u64>) {
-        assert!(range.end <= self.len(), "bricks of the set");
-        let runs = self.runs_of(&range);
-        let (low, bits) = (&self.low[range.clone()], &self.bits[range]);
-        words.reserve(2 + 2 * runs.len() + low.len().div_ceil(2) + bits.len());
-        words.extend([runs.len() as u64, bits.len() as u64]);
-        words.extend(runs.iter().flat_map(|r| [r.high, r.start as u64]));
-        let start = words.len();
-        words.resize(start + low.len().div_ceil(2), 0);
-        bytemuck::cast_slice_mut(&mut words[start..])[..low.len()].copy_from_slice(low);
-        words.extend_from_slice(bits);
-    }
-
-    /// Reads the bricks that [`pack`](Self::pack) has written at the front of `words`; returns them and the words
-    /// that follow.
-    ///
-    /// # Panics
-    /// If there are too few words.
-    pub fn unpack(words: &[u64]) -> (Self, &[u64]) {
-        let (head, words) = words.split_at(2);
-        let (runs, words) = words.split_at(2 * head[0] as usize);
-        let (low, words) = words.split_at((head[1] as usize).div_ceil(2));
-        let (bits, words) = words.split_at(head[1] as usize);
-        let runs = runs.as_chunks().0.iter();
-        let set = Self {
-            low: bytemuck::cast_slice(low)[..bits.len()].to_vec(),
-            bits: bits.to_vec(),
-            runs: runs.map(|&[high, start]| Run { high, start: start as usize }).collect(),
-            full: None,
-        };
-        (set, words)
     }
 
     /// The union of sets. The larger of two sets is changed in place.

@@ -5,12 +5,14 @@ use crate::brick::ones;
 use crate::brick::{self, Brick};
 use crate::octant::{Level, position};
 use crate::widest;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// A tile and its margin, one word per row. Tiles are mostly empty at coarse levels, so only rows that can hold a
-/// result are touched. One tile serves a whole pass, to avoid zeroing its memory.
+/// result are touched. One tile serves all passes of a thread, to avoid zeroing its memory.
 ///
-/// Invariant between tiles of a pass: it is empty, so `rows` and `half` are zero.
+/// Invariant between tiles: it is empty, so `rows` and `half` are zero.
+#[derive(Default)]
 struct Tile {
     radius: usize,
     /// Rows on either side of the tile's own along y and z: the radius, rounded up to whole bricks of parents.
@@ -29,6 +31,11 @@ struct Tile {
     half: Vec<u64>,
 }
 
+thread_local! {
+    /// An empty tile, while no pass has it.
+    static SPARE: Cell<Tile> = Cell::default();
+}
+
 /// The range from the first set bit to the last.
 fn span(bits: u32) -> Range<usize> {
     bits.trailing_zeros() as usize..(u32::BITS - bits.leading_zeros()) as usize
@@ -42,7 +49,7 @@ pub(super) fn pass(
     radius: u32,
     to_parents: bool,
 ) -> (Gathered, u64) {
-    let (mut tile, mut out) = (Tile::new(radius as usize), Gathered::new(l));
+    let (mut tile, mut out) = (SPARE.take().with_radius(radius as usize), Gathered::new(l));
     let (mut words, mut now) = (0, None);
     for b in sources {
         let key = b.key >> (3 * TILE_BRICKS_LOG2);
@@ -53,18 +60,21 @@ pub(super) fn pass(
         tile.put(b);
     }
     words += now.map_or(0, |done| tile.dilate(done, to_parents, &mut out));
+    SPARE.set(tile);
     (out, words)
 }
 
 impl Tile {
-    /// An empty tile.
-    fn new(radius: usize) -> Self {
+    /// The same, empty, for another radius.
+    fn with_radius(mut self, radius: usize) -> Self {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
-        let margin = radius.next_multiple_of(8);
-        let side = TILE + 2 * margin;
-        let (rows, half) = (vec![0; side * side], vec![0; side * side / 4]);
-        let (spread, columns_at) = (rows.clone(), [0; TILE]);
-        Self { radius, margin, side, rows, layers: 0, columns: 0, columns_at, spread, half }
+        (self.radius, self.margin) = (radius, radius.next_multiple_of(8));
+        self.side = TILE + 2 * self.margin;
+        let rows = self.rows.len().max(self.side * self.side);
+        self.rows.resize(rows, 0);
+        self.spread.resize(rows, 0);
+        self.half.resize(rows / 4, 0);
+        self
     }
 
     /// The ranges of rows, along y and along z, that can hold results. The tile must not be empty.

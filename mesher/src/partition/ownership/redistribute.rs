@@ -7,78 +7,65 @@ use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::PerLevel;
 use ranks::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
+use std::mem::take;
 use std::ops::Range;
 
 impl Ownership {
-    /// Sends octants of level `l` to the ranks that hold their bricks. For each set, returns the union over all ranks,
-    /// restricted to bricks that this rank holds; and the number of bricks sent point to point, once per receiver.
+    /// Sends octants of level `l`, made from [sources](Self::sources) of level `from`, to the ranks that hold their bricks. For each set, returns
+    /// the union over all ranks, restricted to bricks that this rank holds; and the number of bricks sent point to point, once per receiver.
     /// Fully replicated bricks are not counted. Collective.
     pub fn redistribute<const N: usize>(
         &self,
+        from: Level,
         l: Level,
-        sets: [BrickSet; N],
+        mut sets: [BrickSet; N],
         comm: &dyn Comm,
     ) -> ([BrickSet; N], u64) {
-        let sets = sets.into_iter().map(|set| (l, set)).collect();
-        let (sets, sent) = self.send_all(sets, comm);
-        (sets.try_into().expect("as many sets as were passed"), sent)
+        // Otherwise all ranks have made the same.
+        let sent = match self.is_everywhere(from) {
+            false => self.send_all(&mut sets.each_mut().map(|set| (l, set)), comm),
+            true => 0,
+        };
+        (sets, sent)
     }
 
     /// Replaces each set by its union over all ranks, restricted to the bricks that this rank holds. Afterwards all
     /// replicas agree. Also moves bricks to their new holders after a change of partition. Collective.
     pub fn synchronise_replicas(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
-        let levels = sets.iter_mut().flat_map(|set| (0..).zip(std::mem::take(*set)));
-        let (synchronised, _) = self.send_all(levels.collect(), comm);
-        for (set, whole) in sets.iter_mut().flat_map(|set| set.iter_mut()).zip(synchronised) {
-            *set = whole;
-        }
+        let levels = sets.iter_mut().flat_map(|set| (0..).zip(set.iter_mut()));
+        self.send_all(&mut levels.collect::<Vec<_>>(), comm);
     }
 
-    /// Sends the octants of several sets, each with its level, to the ranks that hold their bricks. All ranks pass the same
-    /// levels in the same order. Collective.
-    fn send_all(&self, mut sets: Vec<(Level, BrickSet)>, comm: &dyn Comm) -> (Vec<BrickSet>, u64) {
+    /// Sends the octants of several sets, each with its level, to the ranks that hold their bricks, and receives those of the bricks that this
+    /// rank holds. All ranks pass the same levels in the same order. Returns the number of bricks sent point to point. Collective.
+    fn send_all(&self, sets: &mut [(Level, &mut BrickSet)], comm: &dyn Comm) -> u64 {
         if self.ranks == 1 {
-            return (sets.into_iter().map(|(_, set)| set).collect(), 0);
+            return 0;
         }
         let any_full = sets.iter().any(|(l, _)| *l <= self.level_fully_replicated);
         let mut out = Outgoing::default();
-        let select = |(index, (l, set)): (usize, &mut (Level, BrickSet))| {
+        let select = |(index, (l, set)): (usize, &mut (Level, &mut BrickSet))| {
             self.select(index, *l, set, &mut out)
         };
         let retained: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
-        if any_full && let Some(to_reducers) = split_by_reducer(&mut out.full, |a, b| a | b, comm) {
-            out.full.clear();
-            out.queue.extend(to_reducers.into_iter().map(|(to, e)| (to, ENTRIES_TO_REDUCE, e)));
-        }
-        let (messages, sent) = messages(out.queue, &sets);
+        let to_reducers =
+            if any_full { split_by_reducer(&mut out.full, |a, b| a | b, comm) } else { None };
+        let (messages, sent) = out.messages(to_reducers, sets);
         // The parts of each set on this rank: the retained one and those received.
-        let kept = sets.into_iter().zip(retained).map(|((_, set), range)| vec![set.keep(range)]);
-        let mut parts: Vec<Vec<BrickSet>> = kept.collect();
-        let mut received: Vec<Entry> = Vec::new();
-        for (_, mut words) in comm.sparse_all_to_all(messages).messages() {
-            while let Some((&header, packed)) = words.split_first() {
-                if header < ENTRIES {
-                    let (set, rest) = BrickSet::unpack(packed);
-                    parts[header as usize].push(set);
-                    words = rest;
-                    continue;
-                }
-                let (entries, rest) = packed[1..].split_at(2 * packed[0] as usize);
-                let is_to_reduce = header == ENTRIES_TO_REDUCE;
-                let target = if is_to_reduce { &mut out.full } else { &mut received };
-                target.extend_from_slice(entries.as_chunks().0);
-                words = rest;
-            }
+        let keep =
+            |((_, set), range): (&mut (Level, &mut BrickSet), _)| vec![take(*set).keep(range)];
+        let mut parts: Vec<Vec<BrickSet>> = sets.iter_mut().zip(retained).map(keep).collect();
+        for (_, words) in comm.sparse_all_to_all(messages).messages() {
+            add(words.as_chunks().0, &mut parts, &mut out.full);
         }
         if any_full {
-            received.extend(all_gather_from_reducers(out.full, |a, b| a | b, comm));
+            let all = all_gather_from_reducers(take(&mut out.full), |a, b| a | b, comm);
+            add(&all, &mut parts, &mut out.full);
         }
-        received.sort_by_key(|e| e[0]);
-        for entries in received.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
-            let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
-            parts[(entries[0][0] >> KEY_BITS) as usize].push(entries.iter().map(brick).collect());
+        for ((_, set), parts) in sets.iter_mut().zip(parts) {
+            **set = BrickSet::union_of(parts);
         }
-        (parts.into_iter().map(BrickSet::union_of).collect(), sent)
+        sent
     }
 
     /// Adds the bricks of set `i` that other ranks hold to `out`. Returns the range of the set that this rank
@@ -94,7 +81,11 @@ impl Ownership {
                     let (interval, owner) = self.interval_at(brick_start(l, set.brick(first).key));
                     let same_owner = first..position(interval.end);
                     first = same_owner.end;
-                    out.queue(i, set, same_owner, owner);
+                    out.queue.push((
+                        owner,
+                        Some(i),
+                        [same_owner.start as u64, same_owner.end as u64],
+                    ));
                 }
             }
             return local;
@@ -111,23 +102,29 @@ impl Ownership {
             }
             // Such bricks are few: queued as single entries.
             let others = self.meeting_in(l, b.key).iter().filter(|i| Some(i.1) != self.rank);
-            out.queue.extend(others.map(|&(_, owner)| (owner, ENTRIES, entry)));
+            out.queue.extend(others.map(|&(_, owner)| (owner, None, entry)));
             if let Placement::Remote(_) = placement { 0 } else { b.bits }
         });
         0..set.len()
     }
 }
 
-/// Up to this many bricks are sent as (key, bits) entries: no longer than a packed block, and simpler.
-const ENTRIES_MAX: usize = 10;
+/// Adds entries, in the order of their sets and keys, to the parts of their sets, and those to be reduced to `full`.
+fn add(entries: &[Entry], parts: &mut [Vec<BrickSet>], full: &mut Vec<Entry>) {
+    for of_set in entries.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
+        let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
+        match parts.get_mut((of_set[0][0] >> KEY_BITS) as usize) {
+            Some(parts) => parts.push(of_set.iter().map(brick).collect()),
+            None => full.extend(of_set.iter().map(|[key, bits]| [key ^ TO_REDUCE, *bits])),
+        }
+    }
+}
 
-/// Header of a block of entries, instead of a set index. The number of entries follows, then the entries.
-const ENTRIES: u64 = 1 << 32;
-/// The same for fully replicated bricks, which the receiver reduces.
-const ENTRIES_TO_REDUCE: u64 = ENTRIES + 1;
+/// Marks the key of an entry that the receiver reduces: a part of a fully replicated brick.
+const TO_REDUCE: u64 = 1 << 63;
 
-/// What is sent to a rank: under the index of a set, the range of positions of some bricks; under another header, an entry.
-type Queued = (usize, u64, [u64; 2]);
+/// What is sent to a rank: the range of positions of some bricks of a set; or an entry, without a set.
+type Queued = (usize, Option<usize>, [u64; 2]);
 
 /// The bricks to send. Entries store their set index in the bits above the key.
 #[derive(Default)]
@@ -138,42 +135,36 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    /// Queues bricks of a set for rank `to`.
-    fn queue(&mut self, index: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
-        if bricks.len() > ENTRIES_MAX {
-            let range = [bricks.start as u64, bricks.end as u64];
-            return self.queue.push((to, index as u64, range));
+    /// Serialises the bricks of `sets` and those for reducers. Also returns the number of the former.
+    fn messages(
+        &mut self,
+        to_reducers: Option<Vec<(usize, Entry)>>,
+        sets: &[(Level, &mut BrickSet)],
+    ) -> (MessageBuffer, u64) {
+        // With METIS a rank may own several intervals in a brick, which gives duplicates.
+        self.queue.sort();
+        self.queue.dedup();
+        let bricks = |(_, set, [start, end]): &Queued| if set.is_some() { end - start } else { 1 };
+        let sent: u64 = self.queue.iter().map(bricks).sum();
+        if let Some(to_reducers) = to_reducers {
+            self.full.clear();
+            let marked = |(to, [key, bits]): (usize, Entry)| (to, None, [key | TO_REDUCE, bits]);
+            self.queue.extend(to_reducers.into_iter().map(marked));
+            self.queue.sort_by_key(|queued| queued.0);
         }
-        let entry = |b: Brick| [(index as u64) << KEY_BITS | b.key, b.bits];
-        self.queue.extend(bricks.map(|position| (to, ENTRIES, entry(set.brick(position)))));
+        let mut messages = MessageBuffer::with_capacity(2 * (sent as usize + self.queue.len()));
+        for &(to, index, [start, end]) in &self.queue {
+            messages.append(to, |words| match index {
+                None => words.extend([start, end]),
+                Some(i) => {
+                    let entry = |at: u64| {
+                        let b = sets[i].1.brick(at as usize);
+                        [(i as u64) << KEY_BITS | b.key, b.bits]
+                    };
+                    words.extend((start..end).flat_map(entry));
+                }
+            });
+        }
+        (messages, sent)
     }
-}
-
-/// Serialises a queue of bricks of `sets`. Also returns the number of bricks, without those to be reduced.
-fn messages(mut queue: Vec<Queued>, sets: &[(Level, BrickSet)]) -> (MessageBuffer, u64) {
-    queue.sort_by_key(|&(to, header, _)| (to, header));
-    // With METIS a rank may own several intervals in a brick, which gives duplicates.
-    queue.dedup();
-    let bricks = |&(_, header, [start, end]): &Queued| match header {
-        ENTRIES_TO_REDUCE => 0,
-        ENTRIES => 1,
-        _ => end - start,
-    };
-    let sent: u64 = queue.iter().map(bricks).sum();
-    // A packed brick takes 1.5 words, an entry 2.
-    let mut messages = MessageBuffer::with_capacity(2 * (sent as usize + queue.len()));
-    for run in queue.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let (to, header, _) = run[0];
-        messages.append(to, |words| match sets.get(header as usize) {
-            Some((_, set)) => run.iter().for_each(|&(_, _, [start, end])| {
-                words.push(header);
-                set.pack(start as usize..end as usize, words);
-            }),
-            None => {
-                words.extend([header, run.len() as u64]);
-                run.iter().for_each(|queued| words.extend(queued.2));
-            }
-        });
-    }
-    (messages, sent)
 }

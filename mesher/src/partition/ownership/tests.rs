@@ -8,6 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Level of the octants that have owners here; bricks are tested down to one level below those that fill such an octant.
 pub const FINE: Level = 3;
 pub const RANKS: usize = 12;
+/// Deepest of the levels that so many ranks hold.
+const EVERYWHERE: Level = 2;
 
 /// Owners of all octants of level [`FINE`]: one interval for each rank, or many as from METIS.
 pub fn owners() -> impl Strategy<Value = Vec<usize>> {
@@ -49,9 +51,9 @@ proptest! {
     #[test]
     fn ranks_hold_the_bricks_that_they_own_part_of(owners in owners()) {
         let views: Vec<Ownership> = (0..RANKS).map(|r| ownership(r, &owners)).collect();
-        let (mut replicated, mut fully) = (1, 1);
+        let (mut replicated, mut fully) = (EVERYWHERE, EVERYWHERE);
         for (l, key, owners) in bricks(&owners) {
-            let many = l < 2 || owners.len() >= OWNERS_MANY;
+            let many = l <= EVERYWHERE || owners.len() >= OWNERS_MANY;
             if l >= 2 && owners.len() > 1 { replicated = replicated.max(l); }
             if many { fully = fully.max(l); }
             for (rank, ownership) in views.iter().enumerate() {
