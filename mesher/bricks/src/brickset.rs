@@ -261,8 +261,10 @@ impl BrickSet {
 impl FromIterator<Brick> for BrickSet {
     #[inline]
     fn from_iter<I: IntoIterator<Item = Brick>>(bricks: I) -> Self {
-        let mut set = Self::default();
-        bricks.into_iter().for_each(|b| set.push(b.key, b.bits));
+        let (mut set, bricks) = (Self::default(), bricks.into_iter());
+        set.low.reserve(bricks.size_hint().0);
+        set.bits.reserve(bricks.size_hint().0);
+        bricks.for_each(|b| set.push(b.key, b.bits));
         set
     }
 }

@@ -44,12 +44,6 @@ impl BrickSet {
         self
     }
 
-    /// The union of sets. The larger of two sets is changed in place.
-    pub fn union_of(mut sets: Vec<Self>) -> Self {
-        sets.sort_by_key(Self::len);
-        sets.into_iter().reduce(Self::union).unwrap_or_default()
-    }
-
     /// The union of two sets. Merges in place, from the back, because sets take much of the memory.
     pub fn union(self, other: Self) -> Self {
         let (mut set, rest) = if self.len() < other.len() { (other, self) } else { (self, other) };

@@ -101,9 +101,9 @@ proptest! {
         });
         let [before, middle, after] = intervals;
         let around = before.clone().union(after.clone());
-        prop_assert_eq!(BrickSet::union_of(vec![around, middle.clone()]), x.clone());
-        prop_assert_eq!(BrickSet::union_of(vec![after, middle, before]), x.clone());
-        prop_assert_eq!(BrickSet::union_of(vec![y, x.clone()]), of(&both));
+        prop_assert_eq!(around.union(middle.clone()), x.clone());
+        prop_assert_eq!(after.union(middle).union(before), x.clone());
+        prop_assert_eq!(y.union(x.clone()), of(&both));
         let mut cursor = x.cursor();
         for key in both.keys() {
             let want = a.get(key).copied().unwrap_or(0);

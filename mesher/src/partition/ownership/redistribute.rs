@@ -51,20 +51,27 @@ impl Ownership {
         let to_reducers =
             if any_full { split_by_reducer(&mut out.full, |a, b| a | b, comm) } else { None };
         let (messages, sent) = out.messages(to_reducers, sets);
-        // The parts of each set on this rank: the retained one and those received.
-        let keep =
-            |((_, set), range): (&mut (Level, &mut BrickSet), _)| vec![take(*set).keep(range)];
-        let mut parts: Vec<Vec<BrickSet>> = sets.iter_mut().zip(retained).map(keep).collect();
+        for ((_, set), range) in sets.iter_mut().zip(retained) {
+            **set = take(*set).keep(range);
+        }
+        let mut few: Vec<Entry> = Vec::new();
         for (_, words) in comm.sparse_all_to_all(messages).messages() {
-            add(words.as_chunks().0, &mut parts, &mut out.full);
+            for entries in words.as_chunks().0.chunk_by(of_one_set) {
+                match entries[0][0] {
+                    TO_REDUCE.. => {
+                        out.full.extend(entries.iter().map(|e| [e[0] ^ TO_REDUCE, e[1]]))
+                    }
+                    // Many are not copied.
+                    _ if entries.len() > ENTRIES_MANY => add(sets, entries),
+                    _ => few.extend(entries),
+                }
+            }
         }
         if any_full {
-            let all = all_gather_from_reducers(take(&mut out.full), |a, b| a | b, comm);
-            add(&all, &mut parts, &mut out.full);
+            few.extend(all_gather_from_reducers(out.full, |a, b| a | b, comm));
         }
-        for ((_, set), parts) in sets.iter_mut().zip(parts) {
-            **set = BrickSet::union_of(parts);
-        }
+        few.sort_by_key(|e| e[0]);
+        few.chunk_by(of_one_set).for_each(|entries| add(sets, entries));
         sent
     }
 
@@ -109,15 +116,19 @@ impl Ownership {
     }
 }
 
-/// Adds entries, in the order of their sets and keys, to the parts of their sets, and those to be reduced to `full`.
-fn add(entries: &[Entry], parts: &mut [Vec<BrickSet>], full: &mut Vec<Entry>) {
-    for of_set in entries.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
-        let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
-        match parts.get_mut((of_set[0][0] >> KEY_BITS) as usize) {
-            Some(parts) => parts.push(of_set.iter().map(brick).collect()),
-            None => full.extend(of_set.iter().map(|[key, bits]| [key ^ TO_REDUCE, *bits])),
-        }
-    }
+/// Number of entries of one set and from one rank from which on they are added to the set on their own.
+const ENTRIES_MANY: usize = 64;
+
+/// Whether two entries are of one set, and both to be reduced or not.
+fn of_one_set(a: &Entry, b: &Entry) -> bool {
+    a[0] >> KEY_BITS == b[0] >> KEY_BITS
+}
+
+/// Adds entries of one set, in the order of their keys.
+fn add(sets: &mut [(Level, &mut BrickSet)], entries: &[Entry]) {
+    let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
+    let (_, set) = &mut sets[(entries[0][0] >> KEY_BITS) as usize];
+    **set = take(*set).union(entries.iter().map(brick).collect());
 }
 
 /// Marks the key of an entry that the receiver reduces: a part of a fully replicated brick.
