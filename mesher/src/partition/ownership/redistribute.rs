@@ -86,13 +86,9 @@ impl Ownership {
                 let mut first = others.start;
                 while first < others.end {
                     let (interval, owner) = self.interval_at(brick_start(l, set.brick(first).key));
-                    let same_owner = first..position(interval.end);
-                    first = same_owner.end;
-                    out.queue.push((
-                        owner,
-                        Some(i),
-                        [same_owner.start as u64, same_owner.end as u64],
-                    ));
+                    let same_owner = [first, position(interval.end)];
+                    first = same_owner[1];
+                    out.queue.push((owner, Some(i), same_owner.map(|at| at as u64)));
                 }
             }
             return local;
