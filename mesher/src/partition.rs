@@ -7,7 +7,7 @@
 //!
 //! Invariants:
 //! - every rank has the same map from the curve to owners, and the intervals of all ranks tile the curve;
-//! - a rank holds a brick if it owns part of it; all ranks hold those with part of nine or more intervals of the curve, and those of the coarsest levels;
+//! - a rank holds a brick if it owns part of it; all ranks hold those with part of nine or more intervals of the curve, and those of the coarsest levels (to 1 + log4 p on p ranks);
 //! - after [`synchronise_replicas`](ownership::Ownership::synchronise_replicas) all replicas of a brick are equal.
 
 pub mod area;

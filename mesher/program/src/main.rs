@@ -59,12 +59,18 @@ fn main() {
 /// their own, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
 /// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
 /// needs as much again in every phase (a page fault takes 2 us on a virtual machine). Simulated ranks have a heap each, as ranks in processes
-/// have: in a common one, the lists of free blocks are as long as those of all ranks, and a rank finds what the others have freed, out of its
-/// caches. The thread that handles signals needs none, which would take 64 MiB of address space.
+/// have, unless the address space is too small: in a common one, a rank searches what all ranks have freed, which is not in its caches. That took a
+/// fifth of the CPU time of 1,024 ranks. Otherwise the thread that handles signals needs no heap of its own, which would take 64 MiB of address space.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn fix_heap(comm: CommChoice) {
     use libc::{M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
-    let heaps = if let CommChoice::Sim { ranks, .. } = comm { 2 + ranks as i32 } else { 1 };
+    let heaps = match comm {
+        // Those of the ranks, of the first thread and of that for signals; with the stack of a rank.
+        CommChoice::Sim { ranks, .. } if planner::address_space_left() > 1.2e8 * ranks as f64 => {
+            ranks as i32 + 2
+        }
+        _ => 1,
+    };
     let fixed = [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, heaps)];
     for (parameter, value) in fixed {
         // SAFETY: `mallopt` only sets a number, under the lock of the heap; any size is valid.

@@ -13,6 +13,7 @@ use crate::partition::Partitioner;
 use crate::record::{Job, Phase, peak_rss_bytes};
 use crate::sides::Summary;
 use bricks::octant::Level;
+use ranks::gather;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -72,8 +73,7 @@ impl Report {
         let counters: BTreeMap<String, u64> = serde_json::to_value(counters)
             .and_then(serde_json::from_value)
             .expect("counters are numbers with names");
-        let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
-        words.extend(counters.values());
+        let mut words: Vec<u64> = counters.values().copied().collect();
         words.extend(record.phases.iter().flat_map(|p| {
             let t = p.traffic;
             let times = [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s];
@@ -83,7 +83,6 @@ impl Report {
         // The columns of the table that has a row for each rank.
         let mut columns = (0..).map(|i| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>());
         let mut column = || columns.next().expect("columns have no end");
-        let peak_rss_bytes = column();
         let counters = counters.into_keys().map(|name| (name, column())).collect();
         let phase = |phase: &Phase| {
             let mut seconds = || column().into_iter().map(f64::from_bits).collect::<Vec<f64>>();
@@ -98,6 +97,9 @@ impl Report {
             }
         };
         let phases: Vec<PhaseEntry> = record.phases.iter().map(phase).collect();
+        // The tables of all ranks take memory, too.
+        comm.sum(0);
+        let peak_rss_bytes = gather(*comm, &[peak_rss_bytes() / comm.ranks_in_process() as u64]);
         let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
         let report = Self {
             schema: "octree-mesher-run/2",

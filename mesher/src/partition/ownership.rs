@@ -2,7 +2,7 @@
 //!
 //! Every rank owns intervals of the Morton curve. A brick fills an octant. If one rank owns all of that octant, the brick is local
 //! to that rank. A brick that straddles a partition boundary is *partially replicated*: every rank that owns part of it holds a
-//! replica, as it has bricks below. If nine or more intervals meet in a brick, or its level is one of the coarsest, the brick is *fully
+//! replica, as it has bricks below. If nine or more intervals meet in a brick, or its level is one of the coarsest, to 1 + log4 p on p ranks, the brick is *fully
 //! replicated*: all ranks hold a replica. The rank that owns the minimum corner owns the brick: only that rank counts it and
 //! emits its leaves. It is a source on that rank alone or, on the coarsest levels, on all ranks: to make there what another rank makes, too,
 //! takes less time than to receive it. A rank that holds a brick holds all bricks above it.
@@ -49,7 +49,7 @@ pub struct Ownership {
     boundaries: Arc<[Boundary]>,
     /// This rank's longest interval: most queries are for octants within it.
     own: Range<u64>,
-    /// Deepest of the levels whose bricks are all fully replicated.
+    /// Deepest level whose bricks are fully replicated whatever the boundaries.
     level_everywhere: Level,
     /// Deepest level with a brick of several owners.
     level_replicated: Level,

@@ -126,10 +126,11 @@ impl<'a> Loads<'a> {
     /// Adds `each` for every octant of a set that this rank owns.
     fn add_octants(&mut self, l: Level, set: &BrickSet, each: i64) {
         let ownership = self.ownership;
-        let is_shared = ownership.is_replicated(l);
-        for b in set.bricks().filter(|b| is_shared || ownership.owns(l, b.key)) {
+        for b in set.bricks() {
             if l >= self.level + 2 {
-                self.add(brick_start(l, b.key), each * i64::from(b.bits.count_ones()));
+                if ownership.owns(l, b.key) {
+                    self.add(brick_start(l, b.key), each * i64::from(b.bits.count_ones()));
+                }
                 continue;
             }
             // A brick spans several bins, and several ranks may own parts of it.
@@ -253,6 +254,24 @@ mod tests {
             counts.into_bins().iter().map(|bin| bin[1]).sum::<u64>()
         });
         assert_eq!(loads, [24 * 7, 40 * 7]);
+    }
+
+    #[test]
+    fn bricks_that_all_ranks_hold_are_counted_by_their_owners() {
+        const RANKS: usize = 64;
+        let (mut split, boundaries) =
+            (PerLevel::default(), |rank| (start57(2, rank), rank as usize));
+        (0..64).for_each(|key| split[4].push(key, u64::MAX));
+        let of_rank = |rank| {
+            let ownership = Ownership::along(rank, RANKS, (0..64).map(boundaries).collect());
+            assert!(ownership.is_everywhere(4), "bins hold whole bricks that all ranks hold");
+            let mut counts = Loads::new(&ownership, 2);
+            counts.add_leaves(&split, &[]);
+            counts.into_bins()
+        };
+        for rank in 0..RANKS {
+            assert_eq!(of_rank(rank), [[start57(2, rank as u64), 64 * 7]]);
+        }
     }
 
     #[test]

@@ -70,10 +70,9 @@ impl Tile {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         (self.radius, self.margin) = (radius, radius.next_multiple_of(8));
         self.side = TILE + 2 * self.margin;
-        let rows = self.rows.len().max(self.side * self.side);
-        self.rows.resize(rows, 0);
-        self.spread.resize(rows, 0);
-        self.half.resize(rows / 4, 0);
+        self.rows.resize(self.rows.len().max(self.side * self.side), 0);
+        self.spread.resize(self.rows.len(), 0);
+        self.half.resize(self.rows.len() / 4, 0);
         self
     }
 

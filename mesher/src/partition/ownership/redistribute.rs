@@ -11,7 +11,7 @@ use std::mem::take;
 use std::ops::Range;
 
 impl Ownership {
-    /// Sends octants of level `l`, made from [sources](Self::sources) of level `from`, to the ranks that hold their bricks. For each set, returns
+    /// Sends octants of level `l`, made from [sources](Self::sources) of level `from >= l` or coarser ones, to the ranks that hold their bricks. For each set, returns
     /// the union over all ranks, restricted to bricks that this rank holds; and the number of bricks sent point to point, once per receiver.
     /// Fully replicated bricks are not counted. Collective.
     pub fn redistribute<const N: usize>(
@@ -21,10 +21,10 @@ impl Ownership {
         mut sets: [BrickSet; N],
         comm: &dyn Comm,
     ) -> ([BrickSet; N], u64) {
-        // Otherwise all ranks have made the same.
         let sent = match self.is_everywhere(from) {
-            false => self.send_all(&mut sets.each_mut().map(|set| (l, set)), comm),
+            // All ranks have made the same.
             true => 0,
+            false => self.send_all(&mut sets.each_mut().map(|set| (l, set)), comm),
         };
         (sets, sent)
     }
@@ -112,7 +112,7 @@ impl Ownership {
     }
 }
 
-/// Number of entries of one set and from one rank from which on they are added to the set on their own.
+/// Up to this number, the entries of one set and from one rank are added to the set together with those from other ranks.
 const ENTRIES_MANY: usize = 64;
 
 /// Whether two entries are of one set, and both to be reduced or not.
@@ -148,7 +148,8 @@ impl Outgoing {
         to_reducers: Option<Vec<(usize, Entry)>>,
         sets: &[(Level, &mut BrickSet)],
     ) -> (MessageBuffer, u64) {
-        // With METIS a rank may own several intervals in a brick, which gives duplicates.
+        // For a rank, a set has either entries or ranges, so that its bricks ascend in the message. With METIS a rank may own several intervals
+        // in a brick, which gives duplicates.
         self.queue.sort();
         self.queue.dedup();
         let bricks = |(_, set, [start, end]): &Queued| if set.is_some() { end - start } else { 1 };
