@@ -58,12 +58,12 @@ pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Resul
     });
     job.counters = work;
 
-    // 5. Repartition after refinement: by the predicted work on T0. Replicas of bricks become equal.
+    // 5. Repartition after refinement: by the number of leaves of T0. Replicas of bricks become equal.
     if is_parallel {
         let name = if division.repartitions() { "rebalance" } else { "share top" };
         job.phase(name, |comm| {
             if division.repartitions() {
-                ownership = repartition::by_work(&tree, &ownership, level_base, comm);
+                ownership = repartition::by_leaves(&tree.split, &[], &ownership, level_base, comm);
             }
             ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
         });

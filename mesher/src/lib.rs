@@ -45,6 +45,7 @@ use files::interrupt::stop_at;
 use input::case::Case;
 use input::quantise::Quantised;
 use input::{ingest, quantise};
+use output::leaves::MeshEntry;
 use output::report::Report;
 use output::write::OutDir;
 use output::{htg, leaves, stream};
@@ -63,8 +64,8 @@ pub fn mesh(
     let quantised = quantised(case, job)?;
     let answer = may_run(&quantised, job);
     ranks::uncounted(job.comm, || agree(job.comm, answer))?;
-    let mesh = grow(quantised, job)?;
-    let report = finish(&mesh, out.as_ref(), job)?;
+    let (mesh, entry) = made(quantised, out.as_ref(), job)?;
+    let report = Report::new(&mesh, entry, job);
     stop_at(format_args!("complete:{}", job.comm.rank()));
     if let Some(out) = out {
         out.claim.keep();
@@ -88,8 +89,36 @@ pub fn quantised(case: &Case, job: &mut Job) -> Result<Quantised, Error> {
     Ok(quantised)
 }
 
+/// Phases 3 to 10, on a simulated rank twice if so asked; the times are those of the last time. Collective.
+fn made(
+    quantised: Quantised,
+    out: Option<&OutDir>,
+    job: &mut Job,
+) -> Result<(Mesh, MeshEntry), Error> {
+    let (comm, read) = (job.comm, job.record.phases.len());
+    let alone = job.options.time_alone && comm.size() > 1;
+    let (mut given, mut made) = (Some(quantised), None);
+    let mut make = || {
+        let quantised = if alone { given.clone() } else { given.take() };
+        let first = made.take().map(|_| job.counters);
+        job.record.phases.truncate(read);
+        made = quantised.map(|quantised| {
+            let mesh = grow(quantised, job)?;
+            let entry = finish(&mesh, out, job)?;
+            Ok((mesh, entry))
+        });
+        let is_same = first.is_none_or(|first| first == job.counters);
+        assert!(is_same, "a rank alone must do the same work: {first:?}, then {:?}", job.counters);
+    };
+    match alone {
+        true => comm.repeat_alone(&mut make),
+        false => make(),
+    }
+    made.expect("phases 3 to 10 have run")
+}
+
 /// Phases 9 and 10. Collective.
-fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Error> {
+fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<MeshEntry, Error> {
     // 9. Leaves: streamed in Morton order into the digest, and to disk on request; and the tree, level by level.
     let (counts, digests, heaviest) = job.phase("leaves", |comm| leaves::emit(mesh, out, comm))?;
     job.check(|comm| check::leaves(mesh, &counts, comm));
@@ -105,7 +134,7 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };
     let traffic = job.comm.traffic();
     (job.counters.messages, job.counters.message_bytes) = (traffic.messages, traffic.bytes);
-    Ok(Report::new(mesh, entry, job))
+    Ok(entry)
 }
 
 #[cfg(test)]

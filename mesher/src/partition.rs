@@ -1,7 +1,7 @@
 //! The partition: which rank owns which octants (the paper's section III).
 //!
 //! [`initial`] partitions T0 before it is refined, by an estimate of the leaves. [`repartition`] shifts the boundaries after
-//! refinement and after gradation, when the work is known better. Both rest on [`ownership`], which maps octants to ranks,
+//! refinement and after gradation, when the leaves are known. Both rest on [`ownership`], which maps octants to ranks,
 //! and on [`curve`], which divides the Morton curve into intervals of equal weight. METIS on the graph of *base
 //! leaves* is an option of [`initial`]. No module here imports a phase of the mesher.
 //!
@@ -42,7 +42,7 @@ pub enum Weights {
     Unit,
     /// The number of leaves estimated from facet areas and from the volumes of boxes
     Area,
-    /// As `area`, then repartitioned by the work on T0 after refinement and by the number of leaves after gradation; the same as
+    /// As `area`, then repartitioned by the number of leaves, of T0 after refinement and of the mesh after gradation; the same as
     /// `area` with METIS or with a given --level-base
     #[default]
     Rebalance,

@@ -23,6 +23,8 @@ pub struct Options {
     pub check: bool,
     /// Fail if the geometry leaks.
     pub strict: bool,
+    /// Simulated ranks repeat phases 3 to 10 alone, for the CPU times of a rank with a core and caches of its own.
+    pub time_alone: bool,
     /// What to call the case in advice to the user.
     pub case_name: String,
 }
@@ -133,7 +135,7 @@ impl Recorder {
 }
 
 /// Work done by one rank, in numbers that repeat exactly.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counters {
     /// Tests of a facet against the 64 octants of a brick, those above the rank's part included.
     pub facet_brick_tests: u64,

@@ -54,6 +54,10 @@ pub struct Args {
     /// Communication between ranks: auto, solo (one rank), mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,
+    /// Simulated ranks repeat all work after reading, each alone with the messages that it has received, and report the times of that: those
+    /// of a rank with a core and caches of its own
+    #[arg(long, conflicts_with_all = ["plan", "out"])]
+    time_alone: bool,
     /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
     #[arg(long, conflicts_with = "plan")]
     check: bool,
@@ -167,8 +171,11 @@ pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> R
 /// The options of a run.
 ///
 /// # Errors
-/// If the weights contradict the paper's.
+/// If the weights contradict the paper's, or no ranks are simulated that could be timed alone.
 pub fn options(args: &Args) -> Result<Options, Error> {
+    if args.time_alone && !matches!(args.comm, CommChoice::Sim { .. }) {
+        return Err(Error::input("--time-alone is for simulated ranks: add --comm sim:RANKS"));
+    }
     let why = "--preset paper gives each base leaf weight 1: leave out --weights";
     let weights = match (args.partitioner, args.weights) {
         (Partitioner::Paper, None | Some(Weights::Unit)) => Weights::Unit,
@@ -183,6 +190,7 @@ pub fn options(args: &Args) -> Result<Options, Error> {
         out: args.out.clone().map(|directory| Output { directory, words, tree }),
         check: args.check,
         strict: args.strict,
+        time_alone: args.time_alone,
         case_name: case_name.unwrap_or_else(|| "CASE".to_owned()),
     })
 }

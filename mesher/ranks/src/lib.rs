@@ -65,6 +65,12 @@ pub trait Comm {
         body();
     }
 
+    /// Runs `body`. A simulated rank runs it twice, among the others and then alone, where its calls return what they returned the first time:
+    /// so the second time takes what it takes a rank with a core and caches of its own. Collective if `body` is, the same calls both times.
+    fn repeat_alone(&self, body: &mut dyn FnMut()) {
+        body();
+    }
+
     /// Begins another run in the same job: returns after rank 0 has called it as well, and counts messages from zero from then on.
     /// The other ranks sleep meanwhile: rank 0 may wait for its next run for hours. Collective.
     fn next_run(&self) {}

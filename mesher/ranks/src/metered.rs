@@ -98,6 +98,14 @@ impl<C: Comm> Comm for Metered<C> {
         self.total.set(Traffic { messages, bytes, ..self.total.get() });
     }
 
+    fn repeat_alone(&self, body: &mut dyn FnMut()) {
+        let before = self.total.get();
+        self.comm.repeat_alone(&mut || {
+            self.total.set(before);
+            body();
+        });
+    }
+
     fn next_run(&self) {
         self.comm.next_run();
         self.total.take();

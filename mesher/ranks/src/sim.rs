@@ -12,10 +12,12 @@ pub use world::{Adversary, Arrival, Schedule, World};
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use files::OUT_OF_MEMORY;
 use std::any::Any;
+use std::cell::RefCell;
 use std::io::{Write, stderr};
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::vec::IntoIter;
 use world::Call;
 
 /// One rank of a simulated group.
@@ -23,6 +25,10 @@ pub struct Sim<'a> {
     rank: usize,
     world: &'a World,
     pass: &'a dyn Fn(),
+    /// The results of the calls so far, if they are kept.
+    kept: RefCell<Option<Vec<Gathered>>>,
+    /// What the next calls return again.
+    again: RefCell<IntoIter<Gathered>>,
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -83,13 +89,18 @@ const STOPPED: &str = "stopped because another simulated rank panicked";
 impl<'a> Sim<'a> {
     /// A rank of a world, which has been chosen to run. `pass` passes the token on, and returns when the world has chosen this rank again.
     pub fn new(rank: usize, world: &'a World, pass: &'a dyn Fn()) -> Self {
-        Self { rank, world, pass }
+        Self { rank, world, pass, kept: RefCell::default(), again: RefCell::default() }
     }
 
     fn call(&self, call: Call, words: MessageBuffer) -> Gathered {
+        if let Some(result) = self.again.borrow_mut().next() {
+            return result;
+        }
         self.world.post(self.rank, call, words);
         (self.pass)();
-        self.world.result(self.rank)
+        let result = self.world.result(self.rank);
+        self.kept.borrow_mut().iter_mut().for_each(|kept| kept.push(result.clone()));
+        result
     }
 
     /// The same for words that all ranks receive.
@@ -117,6 +128,16 @@ impl Comm for Sim<'_> {
 
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
         Gathered::unwrap_or_clone(self.call(Call::Send, to))
+    }
+
+    fn repeat_alone(&self, body: &mut dyn FnMut()) {
+        self.kept.replace(Some(Vec::new()));
+        body();
+        // To the end, as results that this rank frees go to the heaps of those that made them.
+        let kept = self.kept.take().unwrap_or_default();
+        self.again.replace(kept.clone().into_iter());
+        body();
+        assert_eq!(self.again.take().len(), 0, "a rank alone must make the same calls");
     }
 
     fn ranks_in_process(&self) -> usize {
@@ -159,6 +180,41 @@ mod tests {
         };
         assert_eq!(order(3), order(3));
         assert!((0..10).any(|s| order(s) != order(3)));
+    }
+
+    #[test]
+    fn a_rank_repeats_its_work_alone_with_the_same_results() {
+        for (sums, senders) in run(5, 7, |c| {
+            let (mut sums, mut senders) = (Vec::new(), Vec::new());
+            c.repeat_alone(&mut || {
+                let to = (c.rank() + 1) % c.size();
+                let received = c.sparse_all_to_all([(to, [1])].into_iter().collect());
+                senders.push(received.messages().map(|m| m.0).collect::<Vec<_>>());
+                // A result cannot depend on what a rank adds when it is alone.
+                sums.push([c.sum((sums.len() * 100 + c.rank()) as u64), c.traffic().messages]);
+            });
+            sums.push([c.sum(1), c.traffic().messages]);
+            (sums, senders)
+        }) {
+            // Two messages, an acknowledgement... of one receiver and a barrier; then three doublings, each time from the same start.
+            assert_eq!(sums, [[10, 8], [10, 8], [5, 11]]);
+            assert!(senders.len() == 2 && senders[0] == senders[1], "{senders:?}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "alone must make the same calls")]
+    fn a_rank_that_makes_fewer_calls_alone_is_found() {
+        run(2, 1, |c| {
+            let mut is_second = false;
+            c.repeat_alone(&mut || {
+                c.sum(1);
+                if !is_second {
+                    c.sum(1);
+                }
+                is_second = true;
+            });
+        });
     }
 
     #[test]

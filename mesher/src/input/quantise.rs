@@ -21,6 +21,7 @@ pub struct FacetCounts {
 }
 
 /// The result of the phase on a rank.
+#[derive(Clone)]
 pub struct Quantised<F = Vec<Facet>> {
     /// The rules, the same on all ranks.
     pub rules: Rules,

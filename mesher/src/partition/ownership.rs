@@ -138,22 +138,6 @@ impl Ownership {
         (start..self.boundaries.get(interval + 1).map_or(ALL.end, |next| next.0), owner)
     }
 
-    /// The ranks whose octants touch this rank's over a face, an edge or a corner; each with the level-19 code of one of this
-    /// rank's octants that it touches.
-    pub fn neighbours(&self) -> Vec<(usize, u64)> {
-        let mut found = vec![false; self.ranks];
-        let mut neighbours = Vec::new();
-        for (l, code) in self.octants() {
-            let extent = corner(l, code).map(|min| (min, min + edge(l)));
-            self.owners_in(0, 0, &extent, &mut |owner| {
-                if Some(owner) != self.rank && !std::mem::replace(&mut found[owner], true) {
-                    neighbours.push((owner, start57(l, code)));
-                }
-            });
-        }
-        neighbours
-    }
-
     /// Calls `found` with the owners of those octants in the given one that an extent reaches, all of them closed; with some more than
     /// once. The extent reaches the given octant.
     pub fn owners_in(&self, l: Level, code: u64, extent: &Extent, found: &mut impl FnMut(usize)) {

@@ -1,17 +1,8 @@
 //! Repartitioning: the boundaries between ranks move along the Morton curve until all ranks have nearly the same load.
 //!
-//! The work in a region is estimated from facet areas before refinement, estimated better from T0, and known exactly after
-//! gradation. So boundaries move twice: after refinement by the predicted time of sides and gradation, after
-//! gradation by the number of leaves. They move no further than the tolerated imbalance requires, and bricks are redistributed
+//! The leaves in a region are estimated from facet areas before refinement, and counted after it, those of T0 first and those of the mesh
+//! after gradation. So boundaries move twice. They move no further than the tolerated imbalance requires, and bricks are redistributed
 //! to the ranks that hold them then. The paper names this as an idea in section V.
-//!
-//! # The cost model
-//! The CPU time that sides and gradation take on a rank is predicted from T0:
-//! a sum of counts times fitted times, in units of 70 ns. Surfaces oblique to the axes leave more components in a
-//! brick; rough ones leave components of a single octant, which branch predictors handle badly. The times were
-//! fitted in November 2026 by non-negative least squares on the relative errors of 64 simulated ranks on each of four meshes, and rounded.
-//! On two meshes that were not used for a later fit, the median relative error per rank is 4 and 5 %, the greatest 15 and 20 %; a refit is
-//! no better there.
 
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, Placement, brick_start};
@@ -19,33 +10,11 @@ use bricks::brick;
 use bricks::brick::ones;
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
-use bricks::tree::{LEVELS, PerLevel, Tree};
+use bricks::tree::{LEVELS, PerLevel};
 use ranks::Comm;
 
-/// Minimum number of groups of bricks sampled on the most populated level; the same fraction of the other levels.
-const SAMPLE: usize = 256;
-/// At least one group of this many is sampled.
-const SAMPLE_STRIDE_MAX: usize = 23;
-/// Tolerated load imbalance of the work on T0, which is an estimate. Balancing more tightly would cost more in migration than it saves.
-const TOLERANCE_WORK: f64 = 0.02;
-/// Tolerated load imbalance of the leaves, each of which takes little time.
-const TOLERANCE_LEAVES: f64 = 0.05;
-
-/// The partition with nearly equal work on T0 for sides and gradation. Replicas in `tree` need not be equal. Boundaries lie
-/// between octants of `level`. Collective.
-pub fn by_work(tree: &Tree, ownership: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
-    let mut work = Loads::new(ownership, level);
-    let groups = tree.split.iter().map(BrickSet::len).max().unwrap_or(0);
-    // Odd, as bricks come in groups of powers of two.
-    let stride = (groups / SAMPLE).min(SAMPLE_STRIDE_MAX) | 1;
-    for l in 1..tree.split.len() as Level {
-        work.estimate(tree, l, stride);
-    }
-    for (_, start) in ownership.neighbours() {
-        work.add(start, WEIGHT_OF_NEIGHBOUR);
-    }
-    work.repartition(TOLERANCE_WORK, comm)
-}
+/// Tolerated load imbalance. Balancing more tightly would cost more in migration than it saves.
+const TOLERANCE: f64 = 0.05;
 
 /// The partition with nearly equal numbers of leaves of a tree, without those that are `gone`. Collective.
 pub fn by_leaves(
@@ -57,7 +26,9 @@ pub fn by_leaves(
 ) -> Ownership {
     let mut leaves = Loads::new(ownership, level);
     leaves.add_leaves(split, gone);
-    leaves.repartition(TOLERANCE_LEAVES, comm)
+    let (bins, first_own) = (leaves.into_bins(), ownership.longest().start);
+    let boundaries = curve::repartition(&bins, first_own, TOLERANCE, comm);
+    Ownership::along(comm.rank(), comm.size(), boundaries)
 }
 
 /// Sends the bricks of three sets to the ranks that hold them in another partition. The first, of split octants, may be condensed on some
@@ -95,23 +66,6 @@ struct Loads<'a> {
 impl<'a> Loads<'a> {
     fn new(ownership: &'a Ownership, level: Level) -> Self {
         Self { ownership, level, bins: Vec::new() }
-    }
-
-    /// Adds the estimated work on a level, from every `stride`-th group of bricks.
-    fn estimate(&mut self, tree: &Tree, l: Level, stride: usize) {
-        let above = &tree.split[l as usize - 1];
-        let (mut split, mut crossing) =
-            (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
-        for (n, b) in (0..above.len()).step_by(stride).map(|i| above.brick(i)).enumerate() {
-            // Every other brick of a group, as the bricks of a group are alike; alternately from the first and from the second.
-            let groups = ones(u64::from(brick::parents(b.bits))).map(u64::from);
-            for j in groups.skip(n & 1).step_by(2) {
-                let key = b.key << 3 | j;
-                let leaves = brick::children(brick::byte(b.bits, j)) & !split.get(key);
-                let weight = weight_of_brick(leaves & !crossing.get(key));
-                self.add(brick_start(l, key), 2 * weight * stride as i64);
-            }
-        }
     }
 
     /// Adds the leaves of a tree, without those that are `gone`.
@@ -166,40 +120,6 @@ impl<'a> Loads<'a> {
         };
         self.bins.chunk_by(|a, b| a.0 == b.0).map(&mut sum).collect()
     }
-
-    /// The partition in which loads are equal but for `tolerance`. Collective.
-    fn repartition(self, tolerance: f64, comm: &dyn Comm) -> Ownership {
-        let first_own = self.ownership.longest().start;
-        let boundaries = curve::repartition(&self.into_bins(), first_own, tolerance, comm);
-        Ownership::along(comm.rank(), comm.size(), boundaries)
-    }
-}
-
-/// Time of a brick.
-const BRICK: i64 = 2;
-/// Time of a local component: a set of non-crossing leaves connected over faces within a brick.
-const COMPONENT: i64 = 2;
-/// Additional time of a brick with more than one local component.
-const COMPONENTS_EXTRA: i64 = 2;
-/// Additional time of a local component of a single octant.
-const COMPONENT_SINGLE: i64 = 13;
-
-/// The weight of a neighbouring rank: two dozen messages to it and from it, with their payload. The owner of a mostly empty corner of the
-/// root has a hundred neighbours, other ranks have two dozen.
-const WEIGHT_OF_NEIGHBOUR: i64 = 230;
-
-/// The weight of a brick with the non-crossing leaves `open`.
-#[inline]
-fn weight_of_brick(open: u64) -> i64 {
-    let (mut components, mut single, mut rest) = (0, 0, open);
-    while rest != 0 {
-        let component = brick::flood(rest & rest.wrapping_neg(), rest);
-        rest &= !component;
-        components += 1;
-        single += i64::from(component.is_power_of_two());
-    }
-    let extra = i64::from(components > 1);
-    BRICK + COMPONENT * components + COMPONENTS_EXTRA * extra + COMPONENT_SINGLE * single
 }
 
 #[cfg(test)]
@@ -275,45 +195,6 @@ mod tests {
     }
 
     #[test]
-    fn the_sampled_work_is_near_the_work_of_all_bricks() {
-        // Bricks are alike in long intervals, so the sum over a sample is near the sum over all.
-        let mut tree = Tree { split: split(), ..Tree::default() };
-        for l in 0..=LEVEL as usize {
-            tree.split[l] = tree.split[LEVEL as usize + 1].coarsen();
-            for _ in l..LEVEL as usize {
-                tree.split[l] = tree.split[l].coarsen();
-            }
-        }
-        tree.check_structure();
-        let solo = Ownership::solo();
-        let (mut some, mut all) = (Loads::new(&solo, LEVEL), Loads::new(&solo, LEVEL));
-        for l in 1..tree.split.len() as Level {
-            some.estimate(&tree, l, 7);
-            for b in Tree::exists(&tree.split, l) {
-                let weight = weight_of_brick(b.bits & !tree.split[l as usize].get(b.key));
-                all.add(brick_start(l, b.key), weight);
-            }
-        }
-        let (some, all) = (some.into_bins(), all.into_bins());
-        let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
-        assert!(some.len() < all.len() / 5, "{} of {} bins sampled", some.len(), all.len());
-        assert!(
-            sum(&some).abs_diff(sum(&all)) < sum(&all) / 20,
-            "{} for {}",
-            sum(&some),
-            sum(&all)
-        );
-        // The same in every eighth of the curve.
-        for eighth in 0..8 {
-            let within = |bins: &[Bin]| -> Vec<Bin> {
-                bins.iter().copied().filter(|b| b[0] >> (3 * LEVEL_MAX - 3) == eighth).collect()
-            };
-            let (some, all) = (sum(&within(&some)), sum(&within(&all)));
-            assert!(some.abs_diff(all) < all / 10, "eighth {eighth}: {some} for {all}");
-        }
-    }
-
-    #[test]
     fn bricks_move_whether_ranks_have_condensed_them_or_not() {
         let l = 6;
         // A boundary in a brick, which both ranks hold.
@@ -342,12 +223,5 @@ mod tests {
             });
             assert_eq!(moved, [true, true], "{condensed:02b} from {begin} to {end}");
         }
-    }
-
-    #[test]
-    fn components_of_a_brick_are_counted_by_size() {
-        // Two opposite corners and half of a face between them.
-        let open = 1 | 1 << 63 | brick::SPANS[0][0][0] & brick::SPANS[1][2][2];
-        assert_eq!((weight_of_brick(0), weight_of_brick(open)), (2, 2 + 3 * 2 + 2 + 2 * 13));
     }
 }

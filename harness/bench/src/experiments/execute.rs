@@ -46,6 +46,7 @@ impl Runner<'_> {
         let options = RunOptions {
             // Its digest need not be in the run report.
             mesh: written.then_some(&mesh),
+            time_alone: setup.comm == Comm::Sim && !written,
             ..RunOptions::new(self.place, self.limit)
         };
         let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);

@@ -107,6 +107,8 @@ pub struct RunOptions<'a> {
     pub report: bool,
     /// Stop at the base tree.
     pub ungraded: bool,
+    /// Measure the CPU time of simulated ranks.
+    pub time_alone: bool,
     /// Where runs on MPI use the engine's service, if it has one. Any such run keeps the ranks' activity on disk, to report it if it hangs.
     pub services: Option<&'a Services>,
 }
@@ -114,7 +116,8 @@ pub struct RunOptions<'a> {
 impl<'a> RunOptions<'a> {
     /// A run that writes a run report and nothing else.
     pub fn new(place: &'a Path, limit: Duration) -> Self {
-        Self { place, limit, mesh: None, report: true, ungraded: false, services: None }
+        let (ungraded, time_alone) = (false, false);
+        Self { place, limit, mesh: None, report: true, ungraded, time_alone, services: None }
     }
 
     pub(super) fn report_path(&self) -> PathBuf {
@@ -143,10 +146,9 @@ impl Launcher {
     /// One sentence, if `{ranks}` is missing.
     pub fn parse(text: &str) -> Result<Self, String> {
         let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-        let has_place = words.iter().any(|word| word.contains(RANKS));
         let why = "has no place for the number of ranks";
         let why = || format!("the launcher `{text}` {why}: write {RANKS} there");
-        has_place.then_some(Self { words }).ok_or_else(why)
+        text.contains(RANKS).then_some(Self { words }).ok_or_else(why)
     }
 
     /// `mpirun -n {ranks}`, with the program at this path.

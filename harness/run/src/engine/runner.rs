@@ -441,6 +441,10 @@ mod tests {
         let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json \
                         --partitioner metis --weights area";
         assert_eq!(words(&mesher, &simulated, &plain), expected);
+        let timed = RunOptions { time_alone: true, ..RunOptions::new(Path::new("p"), plain.limit) };
+        let simulated_timed = Layout::on(Ranks::Simulated { ranks: 3, seed: 7 });
+        let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json --time-alone";
+        assert_eq!(words(&mesher, &simulated_timed, &timed), expected);
         let on_mpi = Layout { level_base: Some("2".into()), ..Layout::on(Ranks::Mpi(3)) };
         let expected = "mpirun -n 3 mesher a.toml --comm mpi --quiet --out mesh --status p/status \
                         --ungraded --level-base 2";

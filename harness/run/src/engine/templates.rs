@@ -46,6 +46,8 @@ pub struct Templates {
     pub status: Vec<String>,
     /// Appended to stop at the base tree.
     pub ungraded: Vec<String>,
+    /// Appended to measure the CPU time of simulated ranks, if that takes a run of another kind.
+    pub time_alone: Vec<String>,
     /// Appended to choose the `{partitioner}`.
     pub partitioner: Vec<String>,
     /// Appended to choose the level of the partition, `{level_base}`.
@@ -61,12 +63,13 @@ impl Templates {
     }
 
     /// What is appended to a command, by key, which is also the placeholder that has a value there.
-    fn appended(&self) -> [(&'static str, &[String]); 7] {
+    fn appended(&self) -> [(&'static str, &[String]); 8] {
         [
             ("out", &self.out),
             ("json", &self.json),
             ("status", &self.status),
             ("ungraded", &self.ungraded),
+            ("time_alone", &self.time_alone),
             ("partitioner", &self.partitioner),
             ("level_base", &self.level_base),
             ("weights", &self.weights),
@@ -170,6 +173,7 @@ impl Templates {
             options.report.then(|| text(options.report_path())),
             options.status_path().map(text),
             options.ungraded.then(String::new),
+            options.time_alone.then(String::new),
             layout.partitioner.clone(),
             layout.level_base.clone(),
             layout.weights.clone(),

@@ -158,6 +158,25 @@ fn numbers(report: &Value) -> String {
     lines
 }
 
+/// The work of a rank alone is that among the others.
+#[test]
+fn ranks_that_are_timed_alone_do_the_same_work() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE.replace("{n}", "3").replace("{c}", "false"));
+    for args in ["", " --weights unit", " --partitioner metis", " --ungraded", " --check"] {
+        let of_ranks = |options: &str| {
+            let args = format!("--comm sim:9:4{args}{options}");
+            mesh(&workspace, &args.split(' ').collect::<Vec<_>>())
+        };
+        let (among, alone) = (of_ranks(""), of_ranks(" --time-alone"));
+        assert_eq!(numbers(&alone), numbers(&among), "{args}");
+    }
+    workspace.write("case.toml", CASE.replace("{n}", "1").replace("{c}", "true"));
+    let refused = run(workspace.mesher(&["case.toml", "--comm", "solo", "--time-alone"]));
+    let why = "mesher: --time-alone is for simulated ranks: add --comm sim:RANKS\n";
+    assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), why));
+}
+
 /// A change of estimates, boundaries or messages leaves the mesh as it is, and shows here. If it is intended, UPDATE_COUNTERS=1 writes
 /// the new numbers.
 #[test]

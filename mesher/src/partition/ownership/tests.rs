@@ -1,5 +1,4 @@
 use super::*;
-use bricks::octant::position;
 use bricks::tree::PerLevel;
 use proptest::prelude::*;
 use ranks::{Comm, sim};
@@ -142,35 +141,4 @@ fn a_brick_of_many_owners_is_held_by_all_ranks() {
     let places: BTreeSet<String> =
         (1..64).map(|key| format!("{:?}", ownership.placement(FINE + 1, key))).collect();
     assert_eq!(places.into_iter().collect::<Vec<_>>(), ["Remote(8)", "Remote(9)"]);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
-
-    #[test]
-    fn neighbours_own_octants_that_touch(owners in owners()) {
-        let touch = |a: u64, b: u64| {
-            let (p, q) = (position(a), position(b));
-            (0..3).all(|axis| p[axis].abs_diff(q[axis]) <= 1)
-        };
-        let octants = 0..1u64 << (3 * FINE);
-        let of = |octant: u64| owners[octant as usize];
-        for rank in 0..RANKS {
-            let mine: Vec<u64> = octants.clone().filter(|&o| of(o) == rank).collect();
-            let touched = octants.clone().filter(|&o| mine.iter().any(|&m| touch(m, o)));
-            let others: BTreeSet<usize> = touched.map(of).filter(|&o| o != rank).collect();
-            let ownership = ownership(rank, &owners);
-            let found = ownership.neighbours();
-            prop_assert_eq!(found.len(), others.len());
-            prop_assert_eq!(found.iter().map(|n| n.0).collect::<BTreeSet<_>>(), others);
-            let octants = ownership.octants();
-            for (neighbour, start) in found {
-                let place = octants.iter().find(|&&(l, code)| start57(l, code) == start);
-                let &(l, code) = place.expect("an octant of the rank");
-                let fine = |o: &u64| (start57(l, code)..start57(l, code + 1)).contains(&start57(FINE, *o));
-                let mut theirs = (0..1u64 << (3 * FINE)).filter(|&o| of(o) == neighbour);
-                prop_assert!(theirs.any(|o| mine.iter().filter(|m| fine(m)).any(|&m| touch(m, o))));
-            }
-        }
-    }
 }
