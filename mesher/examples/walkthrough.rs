@@ -173,7 +173,7 @@ fn drawings() -> Vec<(&'static str, String)> {
         ),
         (
             "4-repartition.svg",
-            draw(&repartitioned, "The partition after refinement, by estimated work", by_rank, ""),
+            draw(&repartitioned, "The partition after refinement, by leaves", by_rank, ""),
         ),
         ("5-sides.svg", draw(&base_tree, "Sides of the leaves of T0", by_side, "")),
         ("6-gradation.svg", draw(&graded, "The graded tree: layers and 2:1 balance", by_side, "")),

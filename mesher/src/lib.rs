@@ -95,8 +95,7 @@ fn made(
     out: Option<&OutDir>,
     job: &mut Job,
 ) -> Result<(Mesh, MeshEntry), Error> {
-    let (comm, read) = (job.comm, job.record.phases.len());
-    let alone = job.options.time_alone && comm.size() > 1;
+    let (comm, alone, read) = (job.comm, job.options.time_alone, job.record.phases.len());
     let (mut given, mut made) = (Some(quantised), None);
     let mut make = || {
         let quantised = if alone { given.clone() } else { given.take() };

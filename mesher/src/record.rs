@@ -23,7 +23,7 @@ pub struct Options {
     pub check: bool,
     /// Fail if the geometry leaks.
     pub strict: bool,
-    /// Simulated ranks repeat phases 3 to 10 alone, for the CPU times of a rank with a core and caches of its own.
+    /// Simulated ranks repeat phases 3 to 10 alone, for the times of a rank with a core and caches of its own. Not with `out`.
     pub time_alone: bool,
     /// What to call the case in advice to the user.
     pub case_name: String,

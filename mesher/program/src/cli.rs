@@ -54,8 +54,8 @@ pub struct Args {
     /// Communication between ranks: auto, solo (one rank), mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,
-    /// Simulated ranks repeat all work after reading, each alone with the messages that it has received, and report the times of that: those
-    /// of a rank with a core and caches of its own
+    /// Simulated ranks repeat all phases after `read` and `quantise`, each alone with the messages that it has received, and the report has the
+    /// times of that: those of a rank with a core and caches of its own
     #[arg(long, conflicts_with_all = ["plan", "out"])]
     time_alone: bool,
     /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated

@@ -65,8 +65,8 @@ pub trait Comm {
         body();
     }
 
-    /// Runs `body`. A simulated rank runs it twice, among the others and then alone, where its calls return what they returned the first time:
-    /// so the second time takes what it takes a rank with a core and caches of its own. Collective if `body` is, the same calls both times.
+    /// Runs `body`. A simulated rank runs it twice: among the others, and then alone, when its calls return what they returned before. The
+    /// second time takes as long as on a rank with a core and caches of its own. Collective if `body` is; it makes the same calls both times.
     fn repeat_alone(&self, body: &mut dyn FnMut()) {
         body();
     }

@@ -25,10 +25,10 @@ pub struct Sim<'a> {
     rank: usize,
     world: &'a World,
     pass: &'a dyn Fn(),
-    /// The results of the calls so far, if they are kept.
-    kept: RefCell<Option<Vec<Gathered>>>,
-    /// What the next calls return again.
-    again: RefCell<IntoIter<Gathered>>,
+    /// The calls so far and their results, if they are kept.
+    kept: RefCell<Option<Vec<(Call, Gathered)>>>,
+    /// The calls that are made again, if this rank is alone.
+    again: RefCell<Option<IntoIter<(Call, Gathered)>>>,
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -84,6 +84,7 @@ fn run_ranks(size: usize, seed: u64, body: &(dyn Fn(&Metered<Sim>) + Sync)) {
 }
 
 const LIMITS: &str = "simulate fewer ranks, or raise the limits (ulimit -v, ulimit -u)";
+const UNEQUAL_ALONE: &str = "a rank alone must make the same calls";
 const STOPPED: &str = "stopped because another simulated rank panicked";
 
 impl<'a> Sim<'a> {
@@ -93,13 +94,13 @@ impl<'a> Sim<'a> {
     }
 
     fn call(&self, call: Call, words: MessageBuffer) -> Gathered {
-        if let Some(result) = self.again.borrow_mut().next() {
-            return result;
+        if let Some(again) = &mut *self.again.borrow_mut() {
+            return again.next().filter(|kept| kept.0 == call).expect(UNEQUAL_ALONE).1;
         }
         self.world.post(self.rank, call, words);
         (self.pass)();
         let result = self.world.result(self.rank);
-        self.kept.borrow_mut().iter_mut().for_each(|kept| kept.push(result.clone()));
+        self.kept.borrow_mut().iter_mut().for_each(|kept| kept.push((call, result.clone())));
         result
     }
 
@@ -133,11 +134,11 @@ impl Comm for Sim<'_> {
     fn repeat_alone(&self, body: &mut dyn FnMut()) {
         self.kept.replace(Some(Vec::new()));
         body();
-        // To the end, as results that this rank frees go to the heaps of those that made them.
+        // Results are kept to the end: freed by this rank, they would go back to the heaps of other ranks.
         let kept = self.kept.take().unwrap_or_default();
-        self.again.replace(kept.clone().into_iter());
+        self.again.replace(Some(kept.clone().into_iter()));
         body();
-        assert_eq!(self.again.take().len(), 0, "a rank alone must make the same calls");
+        assert!(self.again.take().is_some_and(|rest| rest.len() == 0), "{UNEQUAL_ALONE}");
     }
 
     fn ranks_in_process(&self) -> usize {
@@ -148,6 +149,7 @@ impl Comm for Sim<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn all_messages_arrive_for_every_seed() {
@@ -196,25 +198,31 @@ mod tests {
             sums.push([c.sum(1), c.traffic().messages]);
             (sums, senders)
         }) {
-            // Two messages, an acknowledgement... of one receiver and a barrier; then three doublings, each time from the same start.
+            // A message, its acknowledgement and three of a barrier; then three of a sum, each time from the same start.
             assert_eq!(sums, [[10, 8], [10, 8], [5, 11]]);
             assert!(senders.len() == 2 && senders[0] == senders[1], "{senders:?}");
         }
     }
 
     #[test]
-    #[should_panic(expected = "alone must make the same calls")]
-    fn a_rank_that_makes_fewer_calls_alone_is_found() {
-        run(2, 1, |c| {
-            let mut is_second = false;
-            c.repeat_alone(&mut || {
-                c.sum(1);
-                if !is_second {
-                    c.sum(1);
-                }
-                is_second = true;
-            });
-        });
+    fn a_rank_that_makes_other_calls_alone_is_found() {
+        let calls: [fn(&dyn Comm); 3] =
+            [|_| {}, |c| _ = (c.sum(1), c.sum(1)), |c| _ = c.all_gather(&[1])];
+        for alone in calls {
+            let is_second = AtomicBool::new(false);
+            let repeated = || {
+                run(1, 1, |c| {
+                    c.repeat_alone(&mut || match is_second.swap(true, Ordering::Relaxed) {
+                        true => alone(c),
+                        false => _ = c.sum(1),
+                    });
+                })
+            };
+            let panic = catch_unwind(AssertUnwindSafe(repeated)).expect_err("other calls");
+            let text = panic.downcast_ref::<String>().cloned();
+            let text = text.or(panic.downcast_ref::<&str>().map(|s| s.to_string()));
+            assert!(text.is_some_and(|text| text.contains(UNEQUAL_ALONE)));
+        }
     }
 
     #[test]

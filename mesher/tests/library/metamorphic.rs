@@ -1,12 +1,16 @@
 //! Metamorphic tests: changes of the input whose effect on the mesh is known exactly, on any number of ranks.
 
 use crate::support::{
-    Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup,
+    Facet, Run, Small, closed, config, cuboid, first_difference, run, slit, small, soup,
 };
 use bricks::octant::{LEVEL_MAX, morton, position};
 use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
+use mesher::record::Recorder;
+use mesher::{Job, Options};
 use proptest::prelude::*;
+use ranks::{Comm, Gathered, MessageBuffer, sim};
+use std::cell::RefCell;
 
 /// Asserts equal leaves and equal components.
 macro_rules! assert_equal {
@@ -347,4 +351,62 @@ fn partitions() -> impl Iterator<Item = Run> {
             })
         })
     })
+}
+
+/// A rank that notes the phases that it enters.
+struct Noting<'a>(&'a dyn Comm, RefCell<Vec<&'static str>>);
+
+impl Comm for Noting<'_> {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.0.size()
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
+        self.0.all_gather(mine)
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        self.0.sums(mine)
+    }
+
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
+        self.0.sparse_all_to_all(to)
+    }
+
+    fn repeat_alone(&self, body: &mut dyn FnMut()) {
+        self.0.repeat_alone(body);
+    }
+
+    fn enter(&self, phase: &'static str) {
+        self.1.borrow_mut().push(phase);
+    }
+}
+
+#[test]
+fn a_simulated_rank_repeats_phases_3_to_10_if_it_is_timed_alone() {
+    let body = slit(1.0, 10.0, Keep::Outside, vec![]);
+    for (ranks, time_alone) in [(1, false), (1, true), (3, false), (3, true)] {
+        let meshed = sim::run(ranks, 1, |comm| {
+            let comm = Noting(comm, RefCell::default());
+            let options = Options { time_alone, ..Options::default() };
+            let mut record = Recorder::default();
+            let job = &mut Job::new(&options, &comm, &mut record);
+            let report = mesher::mesh(&body.mesher_case(), job, |_, _| Ok(())).expect("a case");
+            let names: Vec<_> = record.phases.iter().map(|phase| phase.name).collect();
+            (comm.1.into_inner(), names, report.mesh.digest)
+        });
+        for (entered, names, digest) in &meshed {
+            let times = |name: &str| entered.iter().filter(|phase| **phase == name).count();
+            let again = 1 + usize::from(time_alone);
+            assert_eq!((times("read"), times("quantise")), (1, 1));
+            assert_eq!(["sides", "grade", "leaves", "finish"].map(times), [again; 4]);
+            // Each phase has one entry.
+            let once = names.iter().collect::<std::collections::BTreeSet<_>>();
+            assert_eq!((once.len(), digest), (names.len(), &meshed[0].2));
+        }
+    }
 }

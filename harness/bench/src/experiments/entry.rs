@@ -366,7 +366,7 @@ pub struct Run {
     pub time_wall_s: f64,
     /// Wall time by the harness's clock, from the start of the launcher to its end.
     pub time_launch_s: f64,
-    /// CPU time of the whole process and of all its descendants, seen from outside, in seconds.
+    /// CPU time of the whole process and of all its descendants, seen from outside, in seconds; of simulated ranks, that of `useful_s`.
     pub time_cpu_s: f64,
     /// Peak resident memory per rank, or of the whole process if ranks are simulated.
     pub peak_rss_bytes: Spread,

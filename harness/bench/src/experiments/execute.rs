@@ -61,6 +61,7 @@ impl Runner<'_> {
         let is_known =
             report.phases.iter().all(is_of_all) && useful_s(setup.ranks, &report.phases).sum > 0.0;
         let phases = if is_known { &report.phases[..] } else { &[] };
+        let useful = useful_s(setup.ranks, phases);
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         let why = "its run report has no phases with CPU times, without which simulated ranks cannot be projected";
         Failure::unless(setup.comm != Comm::Sim || !phases.is_empty(), why)?;
@@ -86,9 +87,10 @@ impl Runner<'_> {
             cells: report.cells,
             time_wall_s,
             time_launch_s: finished.time_wall_s,
-            time_cpu_s: finished.time_cpu_s,
+            // Ranks in one process may work more than once.
+            time_cpu_s: if setup.comm == Comm::Sim { useful.sum } else { finished.time_cpu_s },
             peak_rss_bytes: spread(&report.peak_rss_bytes),
-            useful_s: useful_s(setup.ranks, phases),
+            useful_s: useful,
             phases: phases.iter().map(phase).collect(),
             counters: counters.collect(),
             digest: report.digest.unwrap_or_default(),

@@ -107,7 +107,7 @@ pub struct RunOptions<'a> {
     pub report: bool,
     /// Stop at the base tree.
     pub ungraded: bool,
-    /// Measure the CPU time of simulated ranks.
+    /// Time each simulated rank alone, if the engine can.
     pub time_alone: bool,
     /// Where runs on MPI use the engine's service, if it has one. Any such run keeps the ranks' activity on disk, to report it if it hangs.
     pub services: Option<&'a Services>,

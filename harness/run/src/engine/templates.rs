@@ -46,7 +46,7 @@ pub struct Templates {
     pub status: Vec<String>,
     /// Appended to stop at the base tree.
     pub ungraded: Vec<String>,
-    /// Appended to measure the CPU time of simulated ranks, if that takes a run of another kind.
+    /// Appended to time each simulated rank alone.
     pub time_alone: Vec<String>,
     /// Appended to choose the `{partitioner}`.
     pub partitioner: Vec<String>,
