@@ -124,8 +124,10 @@ fn spread(f: &Facet, size: i64, add: &mut impl FnMut(u64, f64)) {
             .map(|step| (1.0 / 3.0 + i as f64 * step).fract());
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let at = [0, 1, 2].map(|k| (a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k])) as i64);
-        if at.iter().all(|c| (0..ROOT_EDGE).contains(c)) {
-            add(morton(at.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32)), area / count);
+        // Facets in the maximum faces of the root are crossed by the leaves within.
+        if at.iter().all(|c| (0..=ROOT_EDGE).contains(c)) {
+            let leaf = at.map(|c| (c.min(ROOT_EDGE - 1) >> (ROOT_BITS - LEVEL_MAX)) as u32);
+            add(morton(leaf), area / count);
         }
     }
 }
@@ -192,6 +194,9 @@ mod tests {
         assert!(leaves.abs_diff(want) < want / 20, "{leaves} for {want}");
         let all = leaves_at_surface(&square, &rules, &Solo);
         assert!((all as u64).abs_diff(want) < want / 20, "{all} for {want}");
+        let end = ROOT_EDGE as i32;
+        let ceiling = square.map(|f| Facet { v: f.v.map(|[x, y, _]| [x, y, end]) });
+        assert_eq!(leaves_at_surface(&ceiling, &rules, &Solo), all);
         let beyond = Facet { v: [[-9, 1, 1], [-9, h, 1], [-9, 1, h]] };
         assert_eq!(leaves_at_surface(&[beyond], &rules, &Solo), 0.0);
     }
