@@ -86,7 +86,7 @@ impl Phases {
         let sides = sides(&tree, &ownership, &facets, &rules);
         let graded = graded(&tree, &sides, &rules, &ownership).split;
         let mesh = Mesh {
-            facets: FacetCounts { total: given.total, margin: 1, digest: 0 },
+            facets: FacetCounts { total: given.total, margin: 1, digest: 0, rounding: 0.0 },
             rules: rules.clone(),
             ownership: Ownership::solo(),
             level_base: 0,

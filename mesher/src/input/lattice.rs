@@ -80,17 +80,22 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + q[a] as f64 * (self.edge / ROOT_EDGE as f64))
     }
 
+    /// The edge of octants of a level, in the user's units.
+    pub fn edge_of(&self, level: Level) -> f64 {
+        self.edge / f64::from(1u32 << level)
+    }
+
     /// The level of a spacing: the shallowest whose cells are that size or smaller. `what` names the spacing in
     /// errors.
     ///
     /// # Errors
     /// If cells of level 19 are larger.
     pub fn level_of(&self, spacing: f64, what: &str) -> Result<Level, Error> {
-        (0..=LEVEL_MAX).find(|&l| self.edge / f64::from(1u32 << l) <= spacing).ok_or_else(|| {
-            let least = self.edge / f64::from(1u32 << LEVEL_MAX);
+        (0..=LEVEL_MAX).find(|&l| self.edge_of(l) <= spacing).ok_or_else(|| {
             Error::input(format!(
-                "{what} {spacing} is too small for a root of edge {}: level {LEVEL_MAX} has cells of {least}; choose a larger spacing or a smaller root",
-                self.edge
+                "{what} {spacing} is too small for a root of edge {}: level {LEVEL_MAX} has cells of {}; choose a larger spacing or a smaller root",
+                self.edge,
+                self.edge_of(LEVEL_MAX)
             ))
         })
     }

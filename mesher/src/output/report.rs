@@ -153,14 +153,14 @@ fn imbalance(values: &[f64]) -> f64 {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { mesh, level_base, ranks, .. } = self;
-        let (edge, level_surface) = (mesh.rules.root.edge, mesh.rules.level_surface);
+        let (root, level_surface) = (&mesh.rules.root, mesh.rules.level_surface);
         let [outside, inside, crossing] = SIDES.map(|side| grouped(mesh.leaves_by_side[side]));
         writeln!(f, "facets         {}", grouped(self.facets))?;
-        writeln!(f, "root edge      {edge} (level 0), surface level {level_surface}")?;
+        writeln!(f, "root edge      {} (level 0), surface level {level_surface}", root.edge)?;
         writeln!(f, "cells          {}", grouped(self.cells))?;
         writeln!(f, "  by side      outside {outside}, inside {inside}, crossing {crossing}")?;
         for (l, &n) in mesh.leaves_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
-            let (cells, edge) = (grouped(n), edge / f64::from(1u32 << l));
+            let (cells, edge) = (grouped(n), root.edge_of(l as Level));
             writeln!(f, "  level {l:>2}     {cells:>16}   edge {edge:e}")?;
         }
         let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.components;

@@ -15,6 +15,9 @@ const BOXES_WITHOUT_EFFECT: &str =
 const NO_FACETS: &str = "the geometry has no facets: the mesh is that of the boxes alone; export the body again unless that is meant";
 const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body: enlarge or move the root unless that is meant";
 
+const ROUNDED: &str = "coordinates of STL files are f32 numbers, which are more than half a cell apart so far from the origin, so that the body has steps: move \
+    it to the origin before its vertices are rounded";
+
 /// A sentence for each warning: what was found, and what to try. Nothing is deleted from T0 yet, so it has those of its inputs, rays and leaks
 /// only.
 pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
@@ -31,6 +34,11 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
         (mesh.facets.margin < 0 && !explains_cut, BODY_CUT),
+        (
+            2.0 * f64::from(mesh.facets.rounding)
+                > mesh.rules.root.edge_of(mesh.rules.level_surface),
+            ROUNDED,
+        ),
     ];
     let Ambiguous { count, example } = summary.ambiguous;
     let ambiguous = example.map(|[x, y, z]| {
@@ -77,7 +85,7 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
 }
 
 fn bounds_nothing(rules: &Rules, case_name: &str) -> String {
-    let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
+    let spacing = rules.root.edge_of(rules.level_surface);
     let [twice, four_times] = [2.0, 4.0].map(|times| times * spacing);
     format!(
         "the facets bound no inside at spacings of {spacing}, {twice} and {four_times}, and are no sheet: close the openings that `harness leak {case_name} \

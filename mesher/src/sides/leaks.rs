@@ -156,12 +156,11 @@ fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     }
     let volumes = components.volumes(base);
     let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
-    let (root, level_fine) = (base.rules.root, base.rules.level_surface);
-    let spacing = |l: Level| root.edge / f64::from(1u32 << l);
+    let root = base.rules.root;
     let leak = |&&(label, first): &&(Label, Candidate)| Leak {
-        spacing_coarse: spacing(level),
-        spacing_fine: spacing(level_fine),
-        volume: volume(label) as f64 * spacing(LEVEL_MAX).powi(3),
+        spacing_coarse: root.edge_of(level),
+        spacing_fine: root.edge_of(base.rules.level_surface),
+        volume: volume(label) as f64 * root.edge_of(LEVEL_MAX).powi(3),
         point: root.locate(first.centroid()),
         level,
         octants: volume(label),
