@@ -52,8 +52,9 @@ pub struct Check {
 }
 
 /// All checks, in the order in which findings are most helpful.
-pub const CHECKS: [Check; 13] = [
+pub const CHECKS: [Check; 14] = [
     manifest::CHECK,
+    manifest::STATED,
     pass::CHECK,
     complete::CHECK,
     spacing::CHECK,

@@ -99,6 +99,23 @@ fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
     assert_eq!(found(|m| m.components_ambiguous = None), 0, "an import knows none");
 }
 
+#[test]
+fn what_a_manifest_leaves_out_is_said() {
+    let correct = support::built_in("enclosed");
+    let said = |change: fn(&mut Manifest)| {
+        let mut mesh = correct.mesh.clone();
+        change(&mut mesh.manifest);
+        let result = check(&Subject::new(&correct.case, Tree::Final, &mesh), "stated");
+        (result.examined, result.nothing_to_check.unwrap_or_default())
+    };
+    assert_eq!(said(|_| ()), (4, String::new()));
+    let lacks = |keys: &str| (0, format!("the manifest does not state {keys}"));
+    assert_eq!(said(|m| m.leaks = None), lacks("leaks"));
+    assert_eq!(said(|m| m.components_ambiguous = None), lacks("components_ambiguous"));
+    let lost: fn(&mut Manifest) = |m| (m.geometry, m.components) = (None, None);
+    assert_eq!(said(lost), lacks("geometry, components"));
+}
+
 /// A box within a box: the space within the inner one is outside by parity, and the far field does not reach it.
 #[test]
 fn enclosed_space_must_be_deleted_or_kept_as_the_case_requires() {
