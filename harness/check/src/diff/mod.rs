@@ -132,7 +132,9 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, [x, y]: [Option<u64>; 2]) -> St
     if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
-    let (body, caveat) = match case.map(|case| why::body(case, &a.manifest)).transpose() {
+    // The inputs of both are the same, as far as both state them.
+    let stating = if a.manifest.geometry.is_some() { a } else { b };
+    let (body, caveat) = match case.map(|case| why::body(case, &stating.manifest)).transpose() {
         Ok(body) => (body, String::new()),
         Err(why) => (None, format!("without the case, because {why}: ")),
     };
@@ -149,8 +151,8 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, [x, y]: [Option<u64>; 2]) -> St
 mod tests {
     use super::*;
     use contract::import::ImportedTree;
-    use contract::leafset;
-    use contract::manifest::{Manifest, octant_index};
+    use contract::leafset::{self, LeafSet};
+    use contract::manifest::{Geometry, Manifest, octant_index};
     use contract::testing::{leaf_set, random_words, words_of};
     use proptest::prelude::*;
 
@@ -250,6 +252,30 @@ mod tests {
                 .starts_with("none: the inputs differ")
         );
         assert!(rules(|m| m.layer_cells_min = 2).starts_with("none: the inputs differ"));
+    }
+
+    /// Of a mesh in the format of another program, the geometry is unknown.
+    #[test]
+    fn a_case_of_another_geometry_judges_neither_mesh() {
+        let case = |z: f32| {
+            let text = "spacing_min = 2.0\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }";
+            Case::from_parts(text, vec![[[1.0, 1.0, z], [5.0, 1.0, z], [1.0, 5.0, z]]]).unwrap()
+        };
+        let (own, other) = (case(1.0), case(5.0));
+        let written = |geometry, side: u64| {
+            let place = tempfile::tempdir().unwrap();
+            let words = words_of(|o| o.level < 2).iter().map(|word| word | side).collect();
+            let inputs = own.manifest(contract::manifest::Tree::Final, "test".to_owned());
+            let set = LeafSet::new(Manifest { geometry, ..inputs }, Vec::new());
+            set.with_parts(vec![words]).write(place.path()).unwrap();
+            place
+        };
+        let (a, b) = (written(None, 0), written(Some(Geometry::of(&own.facets_lattice)), 1));
+        for [a, b] in [[a.path(), b.path()], [b.path(), a.path()]] {
+            let rule = |case: &Case| diff(a, b, Some(case)).unwrap().rule.unwrap();
+            assert!(rule(&own).contains("is right"), "{}", rule(&own));
+            assert!(rule(&other).starts_with("without the case"), "{}", rule(&other));
+        }
     }
 
     #[test]

@@ -177,7 +177,13 @@ impl fmt::Display for Answer {
             }
         }
         match side_decided_by {
-            Some((side, decision)) => writeln!(f, "side\n  {side} by section 4: {decision}"),
+            Some((side, decision)) => {
+                writeln!(f, "side\n  {side} by section 4: {decision}")?;
+                let wrong = leaf.map(|(_, has)| has).filter(|has| has != side);
+                wrong
+                    .iter()
+                    .try_for_each(|has| writeln!(f, "  the mesh is wrong: its leaf is {has}"))
+            }
             None => {
                 let why = "which the mesh does not contain: give the case with --case";
                 writeln!(f, "left out: what depends on facets, {why}")

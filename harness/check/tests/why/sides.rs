@@ -62,6 +62,21 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
 }
 
 #[test]
+fn a_leaf_with_a_wrong_side_is_called_wrong() {
+    let mut correct = support::selftest_case("nested", NESTED);
+    let point = correct.case.root.to_user(word::octant(correct.base.words[0]).centre());
+    let explained = |of: &SelftestCase| {
+        with_mesh(&of.base, Some(&of.case), |mesh| mesh.at(point).unwrap()).to_string()
+    };
+    let text = "  the mesh is wrong: its leaf is inside\n";
+    assert!(!explained(&correct).contains("wrong"));
+    let mut words = correct.base.words.clone();
+    words[0] = words[0] & !3 | Side::Inside as u64;
+    correct.base = correct.base.with_parts(vec![words]);
+    assert!(explained(&correct).ends_with(text), "{}", explained(&correct));
+}
+
+#[test]
 fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
     let correct = with_seeds(&[]);
     let terms = correct.case.rules.clone();
