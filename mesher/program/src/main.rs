@@ -79,10 +79,9 @@ fn fix_heap(comm: CommChoice) {
     if planner::address_space_left().is_finite() {
         return;
     }
-    // Linux may back what the heap grows by here with huge pages, once it is used: 1.5 M cells around 345,332 facets take a seventh less
-    // time. With 60 MB it would be a fifth, but sets that now have mappings of their own would
-    // be in the heap: 8 % more memory for 1e9 cells in place of 1 %.
-    const HEAP: usize = 24 << 20;
+    // Linux may back what the heap grows by here with huge pages, once it is used, as a page fault takes 2 us on a virtual machine. With more,
+    // sets that have mappings of their own would lie in the heap, which takes more memory.
+    const HEAP: usize = 16 << 20;
     fix(M_TOP_PAD, HEAP as i32);
     let block = Vec::<u8>::with_capacity(2 << 20);
     let start = block.as_ptr().addr().next_multiple_of(2 << 20);
