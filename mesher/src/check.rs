@@ -158,9 +158,8 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
         let first = boundaries.partition_point(|b| b.0 <= start) - 1;
         let within = boundaries[first..].iter().take_while(|b| b.0 < end);
         let owners: Vec<usize> = within.map(|b| b.1).collect();
-        let (owner, is_full) =
-            (owners[0], ownership.is_everywhere(l) || owners.len() >= OWNERS_MANY);
-        (owner, if is_full { (0..comm.size()).collect() } else { owners.into_iter().collect() })
+        let is_full = ownership.is_everywhere(l) || owners.len() >= OWNERS_MANY;
+        (owners[0], if is_full { (0..comm.size()).collect() } else { owners.into_iter().collect() })
     };
     let mut out = Vec::new();
     for (number, set) in sets.iter().enumerate() {
@@ -171,8 +170,7 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
             let is_owned = owner == comm.rank();
             assert_eq!(ownership.owns(l, b.key), is_owned, "level {l}: the owner of a brick");
             if holders.len() > 1 {
-                let id = (number as u64) << 5 | u64::from(l);
-                out.push((owner, [id, b.key, b.bits]));
+                out.push((owner, [(number as u64) << 5 | u64::from(l), b.key, b.bits]));
             }
         }
     }

@@ -61,13 +61,12 @@ pub fn agree<T>(comm: &dyn Comm, mine: Result<T, Error>) -> Result<T, Error> {
         packed.push(error.exit_code as u64);
         pack_bytes(error.message.as_bytes(), &mut packed);
     });
-    match comm.all_gather(&packed).messages().next() {
-        None => Ok(value.expect("no rank has an error")),
-        Some((_, words)) => {
-            let (message, _) = unpack_bytes(&words[1..]);
-            Err(Error::new(words[0] as i32, String::from_utf8_lossy(message)))
-        }
-    }
+    let gathered = comm.all_gather(&packed);
+    let Some((_, words)) = gathered.messages().next() else {
+        return Ok(value.expect("no rank has an error"));
+    };
+    let (message, _) = unpack_bytes(&words[1..]);
+    Err(Error::new(words[0] as i32, String::from_utf8_lossy(message)))
 }
 
 #[cfg(test)]

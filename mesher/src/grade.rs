@@ -173,8 +173,7 @@ impl Gradation<'_> {
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
         let owned = self.ownership.owned(l, &fresh).map(|b| u64::from(b.bits.count_ones()));
         self.counters.octants_split_graded += owned.sum::<u64>();
-        let before = std::mem::take(&mut self.split[l as usize]);
-        self.split[l as usize] = before.union(fresh);
+        self.split[l as usize] = std::mem::take(&mut self.split[l as usize]).union(fresh);
     }
 
     /// The layer of finest cells that a mesh without crossing leaves starts from: kept octants of the

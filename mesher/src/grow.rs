@@ -133,9 +133,7 @@ pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Resul
     let mut fingerprint = 0;
     job.check(|comm| {
         check::graded(&mesh, comm);
-        if let Some(base) = &base {
-            check::splits::gradation(&mesh, base, comm);
-        }
+        base.iter().for_each(|base| check::splits::gradation(&mesh, base, comm));
         fingerprint = check::fingerprint(&mesh, comm);
     });
     drop(base);

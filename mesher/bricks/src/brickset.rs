@@ -14,8 +14,7 @@ mod parts;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use crate::brick::ones;
-use crate::brick::{self, Brick};
+use crate::brick::{self, Brick, ones};
 
 /// Bits of a key that are stored per brick.
 const LOW_BITS: u32 = 32;
@@ -237,8 +236,7 @@ impl BrickSet {
         if self.is_empty() {
             return assert!(self.runs.is_empty(), "an empty set must have no runs");
         }
-        let ascend = self.runs.is_sorted_by(|a, b| a.start < b.start);
-        assert!(ascend, "each run must have a brick");
+        assert!(self.runs.is_sorted_by(|a, b| a.start < b.start), "each run must have a brick");
         let (mut same, mut before) = (Self::default(), None);
         for Brick { key, bits } in self.bricks() {
             assert!(bits != 0, "brick {key:#x} must not be empty");

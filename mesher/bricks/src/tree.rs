@@ -14,8 +14,7 @@
 //! its ancestors, so [`Tree::check_structure`] needs no communication; the checks of the mesher execute the last invariant of the
 //! tree, and its sides, which store the deleted leaves, that of the region.
 
-use crate::brick::ones;
-use crate::brick::{self, Brick};
+use crate::brick::{self, Brick, ones};
 use crate::brickset::{BrickSet, Cursor};
 use crate::octant::{LEVEL_MAX, Level, path};
 

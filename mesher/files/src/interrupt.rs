@@ -99,12 +99,9 @@ pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
 pub fn begin() {
     forget();
     decide(false);
-    if IS_IGNORED.load(Relaxed)
-        && let Some((sent, barrier)) = HANDLER.get()
-    {
+    if IS_IGNORED.load(Relaxed) {
         // Like a second signal, which ends the process.
-        let _ = (&*sent).write_all(&[!WAITING]);
-        barrier.wait();
+        wait_for_handler(!WAITING);
     }
 }
 
@@ -117,16 +114,16 @@ pub fn stop_at(point: fmt::Arguments) {
             let _ = kill_process(getpid(), Signal::STOP);
             sleep(TAKING);
             // A signal that the handling thread itself took comes after what it is sent meanwhile, but before what it is sent then.
-            wait_for_handler();
-            wait_for_handler();
+            wait_for_handler(WAITING);
+            wait_for_handler(WAITING);
         });
     }
 }
 
-/// Waits until the signals that were taken before are handled; they may end the process.
-fn wait_for_handler() {
+/// Waits until the signals that were taken before, and then a byte, are handled; they may end the process.
+fn wait_for_handler(byte: u8) {
     if let Some((sent, barrier)) = HANDLER.get() {
-        (&*sent).write_all(&[WAITING]).expect("the thread reads until the process ends");
+        (&*sent).write_all(&[byte]).expect("the thread reads until the process ends");
         barrier.wait();
     }
 }

@@ -26,7 +26,8 @@ use std::path::{Path, PathBuf};
 pub struct Draft {
     /// To write or to seek in; what is not a regular file may not allow the latter.
     pub file: File,
-    place: Place,
+    /// None for what is not a regular file: it is written directly.
+    place: Option<Place>,
 }
 
 #[derive(Debug)]
@@ -35,8 +36,6 @@ enum Place {
     Beside(Unfinished),
     /// A file of a claimed directory, under a temporary name; the claim removes it.
     Claimed { dir: OwnedFd, names: [CString; 2] },
-    /// Not a regular file: written directly.
-    Through,
 }
 
 impl Draft {
@@ -49,7 +48,7 @@ impl Draft {
     pub fn create(path: &Path) -> io::Result<Self> {
         register_output(path)?;
         if let Some(file) = special(path)? {
-            return Ok(Self { file, place: Place::Through });
+            return Ok(Self { file, place: None });
         }
         let path = target(path);
         let folder = folder_of(&path);
@@ -66,7 +65,7 @@ impl Draft {
             let (file, id) = open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL)?;
             Ok((Output { dir, names, id, others: Vec::new(), created: None }, file))
         })?;
-        Ok(Self { file, place: Place::Beside(unfinished) })
+        Ok(Self { file, place: Some(Place::Beside(unfinished)) })
     }
 
     /// Synchronises the file with the disk and gives it its final name.
@@ -74,11 +73,9 @@ impl Draft {
     /// # Errors
     /// If that fails; the file is removed.
     pub fn publish(self) -> io::Result<()> {
-        if !matches!(self.place, Place::Through) {
-            self.file.sync_all()?;
-        }
-        match self.place {
-            Place::Through => {}
+        let Some(place) = self.place else { return Ok(()) };
+        self.file.sync_all()?;
+        match place {
             Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
             Place::Beside(unfinished) => {
                 unfinished.publish(|o| renameat(&o.dir, &o.names[0], &o.dir, &o.names[1]))?;
@@ -252,7 +249,7 @@ impl Claim {
     pub fn draft(&self, name: &str) -> io::Result<Draft> {
         let (dir, names) = (self.unfinished.dir()?, names_of(name));
         let (file, _) = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?;
-        Ok(Draft { file, place: Place::Claimed { dir, names } })
+        Ok(Draft { file, place: Some(Place::Claimed { dir, names }) })
     }
 
     /// Writes the last file. In one process of the run, after all others have published their files.

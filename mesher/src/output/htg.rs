@@ -10,8 +10,7 @@ use crate::error::{Error, agree};
 use crate::output::stream::{LevelCursors, Octants};
 use crate::output::write::{OutDir, TREE};
 use crate::partition::ownership::{Ownership, brick_start};
-use bricks::brick::ones;
-use bricks::brick::{byte, children, parents};
+use bricks::brick::{byte, children, ones, parents};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use files::Draft;
@@ -32,13 +31,13 @@ const WINDOWS_MAX: u64 = 128;
 /// # Errors
 /// If the file cannot be written or the user interrupts the run; the same on all ranks.
 pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
-    let numbering = Numbering::new(mesh, comm);
+    let (nodes, first) = numbering(mesh, comm);
     let (origin, edge) = (mesh.rules.root.origin, mesh.rules.root.edge);
-    let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
+    let shape = Shape { origin, edge, nodes };
     let begin = || TreeWriter::new(out.file(TREE)?, shape.clone());
     let failed = out.failed(TREE);
     let mut file = agree(comm, (comm.rank() == 0).then(begin).transpose().map_err(&failed))?;
-    let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
+    let (mut own, mut last) = (own_siblings(mesh, &first).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
     for begin in (0..shape.windows()).step_by(round as usize) {
@@ -114,44 +113,35 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> io::Result<()> {
     Ok(())
 }
 
-/// Where siblings are in the file. They are numbered from the root's children, which have number 0, level by level, and in Morton order
-/// within a level.
-struct Numbering {
-    /// Number of nodes of each level that has any, over all ranks.
-    nodes: Vec<u64>,
-    /// The first number in each interval of the curve, level by level.
-    first: Vec<u64>,
-}
-
-impl Numbering {
-    /// Counts siblings by interval of the curve, and numbers them. Collective.
-    fn new(mesh: &Mesh, comm: &dyn Comm) -> Self {
-        let ownership = &mesh.ownership;
-        let intervals = ownership.boundaries().len();
-        let (mut nodes, mut first) = (vec![1], vec![0; LEVELS * intervals]);
-        for l in 1..LEVELS as Level {
-            let mut before = None;
-            for b in Tree::exists(&mesh.split, l).filter(|b| ownership.owns(l, b.key)) {
-                assert!(before.replace(b.key) < Some(b.key), "level {l}: bricks must ascend");
-                first[place(ownership, l, b.key)] += u64::from(b.bits.count_ones() / 8);
-            }
+/// Where siblings are in the file: the number of nodes of each level that has any, over all ranks, and the first number of siblings in
+/// each interval of the curve, level by level. Siblings are numbered from the root's children, which have number 0, level by level, and
+/// in Morton order within a level. Collective.
+fn numbering(mesh: &Mesh, comm: &dyn Comm) -> (Vec<u64>, Vec<u64>) {
+    let ownership = &mesh.ownership;
+    let intervals = ownership.boundaries().len();
+    let (mut nodes, mut first) = (vec![1], vec![0; LEVELS * intervals]);
+    for l in 1..LEVELS as Level {
+        let mut before = None;
+        for b in Tree::exists(&mesh.split, l).filter(|b| ownership.owns(l, b.key)) {
+            assert!(before.replace(b.key) < Some(b.key), "level {l}: bricks must ascend");
+            first[place(ownership, l, b.key)] += u64::from(b.bits.count_ones() / 8);
         }
-        // Each interval has one owner, which has counted its siblings.
-        let counted = (0..).zip(&first).filter(|c| *c.1 > 0);
-        let counted: Vec<[u64; 2]> = counted.map(|(place, &count)| [place, count]).collect();
-        for [place, count] in gather(comm, &counted) {
-            first[place as usize] = count;
-        }
-        let mut next = 0;
-        for level in first.chunks_mut(intervals) {
-            let begin = next;
-            for count_or_first in level {
-                next += std::mem::replace(count_or_first, next);
-            }
-            nodes.extend((next > begin).then(|| 8 * (next - begin)));
-        }
-        Self { nodes, first }
     }
+    // Each interval has one owner, which has counted its siblings.
+    let counted = (0..).zip(&first).filter(|c| *c.1 > 0);
+    let counted: Vec<[u64; 2]> = counted.map(|(place, &count)| [place, count]).collect();
+    for [place, count] in gather(comm, &counted) {
+        first[place as usize] = count;
+    }
+    let mut next = 0;
+    for level in first.chunks_mut(intervals) {
+        let begin = next;
+        for count_or_first in level {
+            next += std::mem::replace(count_or_first, next);
+        }
+        nodes.extend((next > begin).then(|| 8 * (next - begin)));
+    }
+    (nodes, first)
 }
 
 /// The place in a numbering of the interval that contains the minimum corner of a brick.
@@ -160,7 +150,7 @@ fn place(ownership: &Ownership, l: Level, key: u64) -> usize {
 }
 
 /// The siblings in the bricks that this rank owns, with their numbers, in ascending order.
-fn own_siblings(mesh: &Mesh, numbering: &Numbering) -> impl Iterator<Item = Numbered> {
+fn own_siblings(mesh: &Mesh, numbers: &[u64]) -> impl Iterator<Item = Numbered> {
     let of_level = move |l: Level| {
         let mut path = Path::new(mesh, l);
         // The place of the last brick, and the number of the next siblings.
@@ -169,7 +159,7 @@ fn own_siblings(mesh: &Mesh, numbering: &Numbering) -> impl Iterator<Item = Numb
         bricks.filter(move |b| mesh.ownership.owns(l, b.key)).map(move |b| {
             let place = place(&mesh.ownership, l, b.key);
             if last.replace(place) != Some(place) {
-                next = numbering.first[place];
+                next = numbers[place];
             }
             let first = next;
             next += u64::from(b.bits.count_ones() / 8);

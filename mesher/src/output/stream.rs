@@ -10,8 +10,7 @@
 
 use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
-use bricks::brick;
-use bricks::brick::ones;
+use bricks::brick::{self, ones};
 use bricks::brickset::Cursor;
 use bricks::octant::{Level, start57};
 use bricks::tree::LEVELS;

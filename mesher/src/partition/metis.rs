@@ -56,18 +56,14 @@ fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Err
     let scale = |w: u64| (u128::from(w) * (1 << 30) / total.max(1 << 30)).max(1) as metis::Idx;
     let scaled: Vec<metis::Idx> = weights.iter().copied().map(scale).collect();
     let mut parts = vec![0 as metis::Idx; leaves.len()];
-    let failed = |e: &dyn std::fmt::Display| {
-        Error::input(format!("METIS failed ({e}): use --partitioner morton"))
-    };
     // METIS keeps its random state per process: threads that share it would change each other's parts.
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    metis::Graph::new(1, ranks as metis::Idx, &xadj, &adjncy)
-        .map_err(|e| failed(&e))?
-        .set_vwgt(&scaled)
-        .set_option(metis::option::Seed(1))
-        .part_kway(&mut parts)
-        .map_err(|e| failed(&e))?;
+    let mut divide = || -> Result<_, Box<dyn std::error::Error>> {
+        let graph = metis::Graph::new(1, ranks as metis::Idx, &xadj, &adjncy)?;
+        Ok(graph.set_vwgt(&scaled).set_option(metis::option::Seed(1)).part_kway(&mut parts)?)
+    };
+    divide().map_err(|e| Error::input(format!("METIS failed ({e}): use --partitioner morton")))?;
     Ok(parts.into_iter().map(|part| part as u64).collect())
 }
 

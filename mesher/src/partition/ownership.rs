@@ -14,8 +14,7 @@
 mod redistribute;
 
 use crate::partition::curve::{ALL, Boundary};
-use bricks::brick::Brick;
-use bricks::brick::ones;
+use bricks::brick::{Brick, ones};
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge, start57};
 use bricks::tree::{PerLevel, Tree};

@@ -6,8 +6,7 @@
 
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, Placement, brick_start};
-use bricks::brick;
-use bricks::brick::ones;
+use bricks::brick::{self, ones};
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel};

@@ -8,8 +8,7 @@
 use super::masks::{Component, Part};
 use super::nodes::{Child, Family, Node, Nodes, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
-use bricks::brick::ones;
-use bricks::brick::{self, Block};
+use bricks::brick::{self, Block, ones};
 use bricks::octant::{Level, neighbour};
 use bricks::widest;
 use std::mem::take;

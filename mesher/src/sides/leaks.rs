@@ -178,8 +178,7 @@ impl Components {
             let bricks = self.nodes.bricks(base.tree, l);
             for (_, part) in bricks.filter(|b| base.ownership.owns(l, b.0.key)) {
                 self.nodes.masks.brick(part, |c, bits| {
-                    let volume = start57(l, bits.count_ones().into());
-                    mine[self.merged[c as usize] as usize] += volume;
+                    mine[self.merged[c as usize] as usize] += start57(l, bits.count_ones().into());
                 });
             }
         }

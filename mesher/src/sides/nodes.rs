@@ -10,8 +10,7 @@
 
 use super::masks::{Component, Masks, Part};
 use crate::partition::ownership::{Ownership, Placement};
-use bricks::brick::ones;
-use bricks::brick::{self, Block, Brick};
+use bricks::brick::{self, Block, Brick, ones};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use bricks::widest;

@@ -54,8 +54,7 @@ fn hashes(f: &Facet) -> Option<[u128; 2]> {
 
 /// The value that `merge` makes of those of all ranks. Collective.
 fn over_ranks<T: Pod>(mine: T, merge: impl Fn(T, T) -> T, comm: &dyn Comm) -> T {
-    let all = uncounted(comm, || gather(comm, &[mine]));
-    all.into_iter().reduce(merge).expect("a rank")
+    uncounted(comm, || gather(comm, &[mine])).into_iter().reduce(merge).expect("a rank")
 }
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a sheet. Collective.
