@@ -190,8 +190,7 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root> {
     let why = "the body has no extent from which to compute a root; give a [root]";
     Failure::unless(longest > 0.0, why)?;
     let edge = scale * longest;
-    let origin = std::array::from_fn(|a| (low[a] + high[a]) * 0.5 - edge * 0.5);
-    Ok(Root { origin, edge })
+    Ok(Root { origin: std::array::from_fn(|a| (low[a] + high[a]) * 0.5 - edge * 0.5), edge })
 }
 
 fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String> {

@@ -3,9 +3,8 @@
 use crate::files;
 use crate::number::numbered;
 use serde::{Deserialize, Serialize};
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf, absolute};
+use std::{fs, io};
 
 /// Size class of a case in the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

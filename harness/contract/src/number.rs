@@ -41,8 +41,7 @@ pub fn point([x, y, z]: [f64; 3]) -> String {
 
 /// The number in a line of a file of `/proc`, by its label.
 pub fn labelled(text: &str, label: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(label))?;
-    line.split_whitespace().next()?.parse().ok()
+    text.lines().find_map(|line| line.strip_prefix(label))?.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]

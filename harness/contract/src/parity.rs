@@ -41,7 +41,8 @@ impl Parity {
     /// As [`Self::windings`], by the two rays along one axis.
     pub fn winding(&self, point: [i64; 3], axis: usize) -> [i64; 2] {
         let mut windings = [0; 2];
-        for &i in self.grids[axis].candidates(project(point, axis)) {
+        let grid = &self.grids[axis];
+        for &i in grid.lists.get(&grid.cell(project(point, axis))).into_iter().flatten() {
             let facet = &self.facets[i as usize];
             let outward = || normal(facet)[axis].signum();
             match crosses(facet, point, axis) {
@@ -111,10 +112,6 @@ impl Grid {
 
     fn cell(&self, point: [i64; 2]) -> [i64; 2] {
         [0, 1].map(|a| point[a].div_euclid(self.width[a]))
-    }
-
-    fn candidates(&self, point: [i64; 2]) -> &[u32] {
-        self.lists.get(&self.cell(point)).map_or(&[], Vec::as_slice)
     }
 }
 

@@ -117,8 +117,7 @@ fn ascii(bytes: &[u8]) -> Result<Body> {
         self::name(&mut words, line, false);
         let why = "a facet follows on the line of `endsolid`";
         Failure::unless(!starts_facet(&words, line), wrong(why))?;
-        let facets = body.facets.len() - facet_first;
-        body.solids.push(Solid { name, facet_first, facets });
+        body.solids.push(Solid { name, facet_first, facets: body.facets.len() - facet_first });
     }
     Ok(body)
 }

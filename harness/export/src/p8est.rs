@@ -67,8 +67,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
     let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; p4est since mid-2020 loads names that end in .30.p8est, and no others";
-    let notes = vec![format!("{} {what}", count - leaves)];
-    Ok(Summary { leaves, bytes, notes })
+    Ok(Summary { leaves, bytes, notes: vec![format!("{} {what}", count - leaves)] })
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.

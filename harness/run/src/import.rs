@@ -19,11 +19,10 @@ use contract::mesh::Mesh;
 use serde::Deserialize;
 use serde_json::json;
 use std::fmt::Display;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
+use std::{fs, io};
 
 /// A mesh that was read.
 pub enum Imported {

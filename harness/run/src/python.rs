@@ -9,11 +9,10 @@ use check::oracle::vote::Answer;
 use contract::case::Facet;
 use contract::files;
 use std::ffi::OsStr;
-use std::fs;
-use std::io;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+use std::{fs, io};
 
 /// Exit code of a script whose package is missing.
 const CODE_MISSING: i32 = 3;

@@ -217,8 +217,7 @@ impl<W: Write + Seek> TreeWriter<W> {
     pub fn new(mut out: W, shape: Shape) -> io::Result<Self> {
         // Without a superblock the file is invalid until it is finished.
         out.write_all(&[0; SUPERBLOCK_BYTES])?;
-        let arrays = arrays(&shape);
-        Ok(Self { out, end: SUPERBLOCK_BYTES as u64, shape, arrays })
+        Ok(Self { out, end: SUPERBLOCK_BYTES as u64, arrays: arrays(&shape), shape })
     }
 
     /// Writes the chunks of a window, which [`Window::compress`] has made.

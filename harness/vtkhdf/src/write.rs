@@ -118,8 +118,7 @@ impl Metadata {
 
     /// Adds an object header with these messages; returns its address.
     fn header(&mut self, messages: &[u8]) -> u64 {
-        let size = (messages.len() as u32).to_le_bytes();
-        self.block([b"OHDR\x02\x02", &size[..], messages].concat())
+        self.block([b"OHDR\x02\x02", &(messages.len() as u32).to_le_bytes()[..], messages].concat())
     }
 
     /// Adds a block and its checksum; returns its address.

@@ -10,9 +10,8 @@ use jiff::Timestamp;
 use run::engine::report::SECONDS_MAX;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::io;
 use std::path::Path;
+use std::{fmt, io};
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";

@@ -6,10 +6,9 @@ use contract::digest::mix;
 use run::engine::process::printed;
 use run::engine::runner::Engine;
 use rustix::system::{sysinfo, uname};
-use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::{fmt, fs};
 
 /// Describes this machine; `mpirun` is the launcher's program, `root` the place of the oracles and of `version`, as the harness prints it.
 pub fn describe(mpirun: &Path, root: &Path, version: &str) -> Machine {

@@ -8,9 +8,8 @@ use contract::number::number;
 use run::engine::layout::node_count;
 use run::engine::process::{self, Watch};
 use serde_json::Value;
-use std::fmt;
-use std::fs;
 use std::time::Duration;
+use std::{fmt, fs};
 
 /// Time after which the ping-pong is killed.
 const PING_PONG_LIMIT: Duration = Duration::from_secs(120);

@@ -15,10 +15,9 @@ use probe::{Fault, Judged, Trial};
 use reduce::size;
 use run::engine::interrupt;
 use run::engine::layout::Ranks;
-use std::fs;
-use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use std::{fs, io};
 
 /// The result of a reduction.
 #[derive(Clone, Debug)]

@@ -6,9 +6,8 @@
 //! false alarm and fails the self test, too. The audit of the mesh with its case must report every corruption of the mesh.
 
 use std::collections::{BTreeMap, HashSet};
-use std::fmt;
-use std::fs;
 use std::path::Path;
+use std::{fmt, fs};
 
 use crate::audit;
 use crate::checks::{self, CheckResult, Subject};

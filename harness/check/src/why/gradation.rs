@@ -186,8 +186,11 @@ impl Search<'_> {
     /// Searches an octant with this content. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
     fn enter(&self, at: Octant, handle: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
         let is_hole = !handle.is_node() && handle.as_leaf().is_none();
+        let distance = self.octant.distance(&at);
+        // No leaf of the searched levels in it can force the split.
+        let is_far = distance > 0 && distance >= self.mesh.layer_reach(at.level.max(self.first));
         match () {
-            () if at == *self.octant || self.is_far(&at) => None,
+            () if at == *self.octant || is_far => None,
             () if is_hole && !self.mesh.has_deleted_crossing() => None,
             () if is_hole => self.hole(at, handle, in_deleted),
             () if handle.is_node() && self.counts_as_split(&at) => self.descend(&at, handle, false),
@@ -230,11 +233,5 @@ impl Search<'_> {
     fn leaf(&self, at: Octant) -> Option<(Rule, Octant)> {
         let is_sought = (self.first..=self.last).contains(&at.level);
         is_sought.then(|| self.mesh.rule_of(&at, self.octant)).flatten().map(|rule| (rule, at))
-    }
-
-    /// Whether no leaf of the searched levels in an octant can force the split.
-    fn is_far(&self, at: &Octant) -> bool {
-        let distance = self.octant.distance(at);
-        distance > 0 && distance >= self.mesh.layer_reach(at.level.max(self.first))
     }
 }

@@ -91,9 +91,7 @@ impl<'a> Mesh<'a> {
         let (handle, octant) = (trail.around.centre(), trail.around.octant);
         if handle.is_node() {
             visit(octant, (!self.is_justified(&octant)).then_some(NEEDLESS));
-            for digit in 0..8 {
-                self.audit_below(&trail.child(self.tree, digit), visit);
-            }
+            (0..8).for_each(|digit| self.audit_below(&trail.child(self.tree, digit), visit));
         } else if handle.as_leaf().is_some() {
             let is_missing = match self.has_nothing_finer(trail) {
                 true => self.base_splits(&octant),

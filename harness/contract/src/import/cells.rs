@@ -56,8 +56,7 @@ impl Cells {
                     cell(i), root.origin, root.edge
                 )
             })?;
-            let side = self.sides.as_ref().map_or(Side::Outside, |sides| sides[i]);
-            Ok(word::encode(octant, side))
+            Ok(word::encode(octant, self.sides.as_ref().map_or(Side::Outside, |sides| sides[i])))
         };
         let in_order = (0..self.count()).map(word).collect::<Result<Vec<u64>, String>>()?;
         self.agree_with_levels(&in_order)?;

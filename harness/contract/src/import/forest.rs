@@ -195,8 +195,7 @@ impl<'a> Input<'a> {
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
     fn align(&mut self) -> Result<()> {
-        let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
-        self.items(padding as u64, 1).map(drop)
+        self.items((self.at.next_multiple_of(ALIGNMENT) - self.at) as u64, 1).map(drop)
     }
 }
 

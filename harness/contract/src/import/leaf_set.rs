@@ -13,10 +13,9 @@ use crate::manifest::{self, Manifest, Part, Sides, Tree};
 use crate::mesh::TREE;
 use crate::npy;
 use crate::word::{self, Order};
-use std::fs;
-use std::io;
 use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::{fs, io};
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
 ///

@@ -235,8 +235,7 @@ impl Patches {
         let Some(facets) = &self.facets else { return SIDES.len() };
         let centre = Point::from(square.centre().map(|c| c as f64));
         // Half a lattice unit more, for rounding.
-        let nearest = facets.within(centre, facets.distance(centre) + 0.5);
-        self.of_facet[nearest[0] as usize]
+        self.of_facet[facets.within(centre, facets.distance(centre) + 0.5)[0] as usize]
     }
 }
 

@@ -17,9 +17,8 @@ use contract::files::write_atomically;
 use numbers::{Number, numbers};
 pub use page::machines;
 use page::{Broken, Drawn};
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// The files of a report.
 pub struct Written {

@@ -133,7 +133,7 @@ pub struct Checked {
 pub fn check(text: &str, numbers: &[Number]) -> Checked {
     let mut found: Vec<(usize, Option<String>)> = Vec::new();
     let code = without_comments(&without(r"(?m)^(?:.*[^\\\n])?% not a result\s*$", text));
-    for definition in all(r"(?m)^\s*\\defresult.*$", &code) {
+    for definition in pattern(r"(?m)^\s*\\defresult.*$").find_iter(&code) {
         found.push((definition.start(), defines_otherwise(definition.as_str(), numbers)));
     }
     let code = without(r"(?m)^\s*\\defresult.*$", &code);
@@ -146,7 +146,7 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
     }));
     let code = NOT_READ.iter().fold(code, |code, pattern| without(pattern, &code));
     let (named, percent) = (found.len(), pattern(r"^(?:\\,|[~\s])*\\%"));
-    for literal in all(LITERAL, &code).into_iter().filter(|number| is_result(number, &code)) {
+    for literal in pattern(LITERAL).find_iter(&code).filter(|number| is_result(number, &code)) {
         let number = literal.as_str();
         // Per cent of a ratio, such as an efficiency.
         let is_percent = percent.is_match(&text[literal.end()..]);
@@ -197,10 +197,6 @@ fn without_comments(text: &str) -> String {
 
 fn pattern(text: &str) -> Regex {
     Regex::new(text).expect("a constant pattern is valid")
-}
-
-fn all<'a>(of: &str, text: &'a str) -> Vec<Match<'a>> {
-    pattern(of).find_iter(text).collect()
 }
 
 /// The text with blanks in place of a pattern, so that everything else keeps its place.

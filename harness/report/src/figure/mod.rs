@@ -197,9 +197,7 @@ pub fn file_name(text: &str) -> String {
 /// Makes names different from each other: the second of a name ends in `-2`.
 pub fn name_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut taken = BTreeSet::new();
-    for name in names {
-        *name = numbered(name, '-', |free| taken.insert(free.clone()));
-    }
+    names.for_each(|name| *name = numbered(name, '-', |free| taken.insert(free.clone())));
 }
 
 /// Asserts the invariants of the figures of a report.

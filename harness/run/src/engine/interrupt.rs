@@ -10,8 +10,7 @@
 use super::session::{PATIENCE, end_all, keep_children};
 use contract::failure::INTERRUPTED;
 use contract::files::publications;
-use files::OUT_OF_MEMORY;
-use files::interrupt;
+use files::{OUT_OF_MEMORY, interrupt};
 use rustix::process::{getpid, set_child_subreaper};
 use signal_hook::low_level::{exit, pipe};
 use std::fs;

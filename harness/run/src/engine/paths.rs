@@ -2,10 +2,9 @@
 
 use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
 use contract::catalogue::Catalogue;
-use std::env;
-use std::io;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::{env, io};
 
 /// A file or a directory that the command writes or reads. It is checked when the command line is parsed, before any work: what is written
 /// can be written, and is nothing that the command reads. Files of a directory are inputs when they are opened.

@@ -16,11 +16,10 @@ use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
 use contract::plain::PlainCase;
 use std::collections::BTreeSet;
-use std::fs;
-use std::io;
 use std::path::{self, Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
+use std::{fs, io};
 
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
@@ -391,8 +390,7 @@ impl Programs {
     /// If one of them is missing.
     pub fn require(&self) -> Result<(), Refusal> {
         self.engine.require()?;
-        let promises = &self.engine.description.promises;
-        if promises.definition { self.reference.require() } else { Ok(()) }
+        if self.engine.description.promises.definition { self.reference.require() } else { Ok(()) }
     }
 
     /// The engine of this name, or that is called so in results: the mesher, the reference or an engine under test.

@@ -7,14 +7,13 @@ use super::failure::End;
 use contract::number::labelled;
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, setsid, waitpid};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
 use std::os::unix::process::CommandExt;
 use std::process::{ChildStdin, ChildStdout, Command, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
+use std::{fs, io};
 use wait4::{ResourceUsage, Wait4};
 
 /// Time for child processes to remove their files.

@@ -131,8 +131,7 @@ impl CaseRun<'_> {
     /// Compares a mesh with its base tree, which is returned, and with the reference.
     fn verify_definition(&mut self, case: &Case, mesh: &LeafSet) -> Option<Meshed> {
         // The mesh of an engine that cannot stop at the base tree is checked against the reference's base tree.
-        let stops = !self.engine().run.ungraded.is_empty();
-        let program = if stops { MESHER } else { REFERENCE };
+        let program = if self.engine().run.ungraded.is_empty() { REFERENCE } else { MESHER };
         let base = self.make("base tree", "base", program, Tree::Base)?;
         self.report.leaves_base = base.mesh.words.len() as u64;
         let references = self.references(mesh);

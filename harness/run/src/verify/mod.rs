@@ -20,10 +20,9 @@ use contract::failure::{Failure, Result, progress};
 use contract::files::publications;
 use options::{Needs, Options};
 use report::{Asked, CaseReport, Report};
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::Instant;
+use std::{fs, thread};
 use tempfile::TempDir;
 
 /// Verifies the cases that the options select.

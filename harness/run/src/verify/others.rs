@@ -20,11 +20,10 @@ use contract::npy::{self, PartFile};
 use contract::parity::Parity;
 use contract::plain::PlainCase;
 use contract::word::{self, Side};
-use std::fs;
-use std::io;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
+use std::{fs, io};
 use toml::Value;
 
 /// On a small case the oracles classify every leaf, up to this many.
