@@ -61,8 +61,9 @@ impl AuditReport {
 
     /// Whether any property of the leaves was checked, beyond their files and counts.
     pub fn checked_anything(&self) -> bool {
-        let formal = [checks::FILES, checks::manifest::NAME, "linear", TREE];
-        self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
+        let is_formal =
+            |name| checks::FORMAL.contains(name) || [checks::FILES, TREE].contains(name);
+        self.checks.iter().any(|c| !c.holds() || c.was_run() && !is_formal(&c.name))
     }
 
     /// The report as JSON, with its verdict, the CPU time and peak memory of the process so far. They describe the audit only if the

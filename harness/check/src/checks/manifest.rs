@@ -14,22 +14,28 @@ pub const NAME: &str = "manifest";
 
 pub(super) const CHECK: Check = Check { name: NAME, wanted: |_| true, run };
 
-/// The manifest states all that other checks compare with a case. If it does not, nothing is wrong with it, but less is shown.
+/// The manifest states all that other checks compare with a case. If it does not, nothing is wrong with it, but less is shown. Formats of
+/// others state nothing of it.
 pub(super) const STATED: Check = Check {
     name: "stated",
-    wanted: |s| s.promises.definition && s.case.is_some() && !s.manifest.lacks_inputs,
+    wanted: |s| {
+        s.promises.definition && s.case.is_some() && !optional_entries(s.manifest)[0].is_empty()
+    },
     run: |subject, result| {
-        let entries = stated(subject.manifest);
-        let (has, lacks): (Vec<&str>, Vec<&str>) =
-            OPTIONAL.into_iter().partition(|key| entries.get(key).is_some());
+        let [has, lacks] = optional_entries(subject.manifest);
         (result.examined, result.note) = (has.len() as u64, has.join(", "));
         let lacks = (!lacks.is_empty()).then(|| lacks.join(", "));
         result.requires(lacks.map(|them| format!("the manifest does not state {them}")));
     },
 };
 
-/// What a manifest may leave out.
-const OPTIONAL: [&str; 4] = ["geometry", "components", "components_ambiguous", "leaks"];
+/// What a manifest may leave out: the keys that it has, and those that it lacks.
+fn optional_entries(manifest: &Manifest) -> [Vec<&'static str>; 2] {
+    let entries = stated(manifest);
+    let all = ["geometry", "components", "components_ambiguous", "leaks"];
+    let (has, lacks) = all.into_iter().partition(|key| entries.get(key).is_some());
+    [has, lacks]
+}
 
 /// The inputs, by their keys. A mesh in the format of another program may lack all but the first two.
 const INPUTS: &str =

@@ -114,6 +114,13 @@ fn what_a_manifest_leaves_out_is_said() {
     assert_eq!(said(|m| m.components_ambiguous = None), lacks("components_ambiguous"));
     let lost: fn(&mut Manifest) = |m| (m.geometry, m.components) = (None, None);
     assert_eq!(said(lost), lacks("geometry, components"));
+    // Formats of others state nothing.
+    let mut imported = correct.mesh.clone();
+    let manifest = &mut imported.manifest;
+    (manifest.geometry, manifest.components) = (None, None);
+    (manifest.components_ambiguous, manifest.leaks) = (None, None);
+    let results = checks::all(&Subject::new(&correct.case, Tree::Final, &imported));
+    assert!(results.iter().all(|result| result.name != "stated"), "{results:?}");
 }
 
 /// A box within a box: the space within the inner one is outside by parity, and the far field does not reach it.
