@@ -56,10 +56,13 @@ pub struct Tightest {
     pub needed_bytes: u64,
 }
 
-/// What the limit on its address space leaves this process, in bytes; infinity without a limit.
+/// What the limits on its address space and its data leave this process, in bytes; infinity without a limit.
 pub fn address_space_left() -> f64 {
-    let used = stated_bytes("/proc/self/status", "VmSize:").unwrap_or(0) as f64;
-    getrlimit(Resource::As).current.map_or(f64::INFINITY, |bytes| (bytes as f64 - used).max(0.0))
+    let left = |(limit, used)| {
+        let used = stated_bytes("/proc/self/status", used).unwrap_or(0) as f64;
+        getrlimit(limit).current.map_or(f64::INFINITY, |bytes| (bytes as f64 - used).max(0.0))
+    };
+    f64::min(left((Resource::As, "VmSize:")), left((Resource::Data, "VmData:")))
 }
 
 /// The least that the groups of this process leave, from its own group to the root of the hierarchy below `mount`. Inside a container

@@ -56,7 +56,7 @@ fn main() {
 }
 
 /// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
-/// their own, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
+/// their own, if the heap has no room for them, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
 /// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
 /// needs as much again in every phase (a page fault takes 2 us on a virtual machine). Simulated ranks have a heap each, as ranks in processes
 /// have, unless the address space is too small: in a common one, a rank searches what all ranks have freed, which is not in its caches. That took a
@@ -80,7 +80,7 @@ fn fix_heap(comm: CommChoice) {
         return;
     }
     // Linux may back what the heap grows by here with huge pages, once it is used, as a page fault takes 2 us on a virtual machine. With more,
-    // sets that have mappings of their own would lie in the heap, which takes more memory.
+    // more of the large sets would find room in the heap in place of mappings of their own.
     const HEAP: usize = 16 << 20;
     fix(M_TOP_PAD, HEAP as i32);
     let block = Vec::<u8>::with_capacity(2 << 20);

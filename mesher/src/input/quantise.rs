@@ -18,7 +18,7 @@ pub struct FacetCounts {
     pub margin: i64,
     /// The digest of the geometry.
     pub digest: u128,
-    /// How far apart the numbers of STL files are at their greatest coordinate; NaN without facets.
+    /// How far apart the numbers of STL files are below the greatest coordinate.
     pub rounding: f32,
 }
 
@@ -48,9 +48,9 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     // Each facet is in one slice.
     let digests = uncounted(comm, || gather(comm, &[digest::of_facets(&facets)]));
     let digest = digests.into_iter().fold(0, u128::wrapping_add);
-    let coordinates = bounds.lo.iter().chain(&bounds.hi);
+    let coordinates = bounds.lo.iter().chain(&bounds.hi).filter(|c| c.is_finite());
     let farthest = coordinates.fold(0f32, |farthest, c| farthest.max(c.abs() as f32));
-    let rounding = farthest.next_up() - farthest;
+    let rounding = farthest - farthest.next_down();
     let counts = FacetCounts { total: slice.total, margin, digest, rounding };
     Ok(Quantised { rules, facets, counts })
 }

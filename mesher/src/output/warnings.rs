@@ -15,7 +15,7 @@ const BOXES_WITHOUT_EFFECT: &str =
 const NO_FACETS: &str = "the geometry has no facets: the mesh is that of the boxes alone; export the body again unless that is meant";
 const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body: enlarge or move the root unless that is meant";
 
-const ROUNDED: &str = "coordinates of STL files are f32 numbers, which are more than half a cell apart so far from the origin, so that the body has steps: move \
+const ROUNDED: &str = "coordinates of STL files are f32 numbers, which are more than half a cell apart so far from the origin, so that the body may have steps: move \
     it to the origin before its vertices are rounded";
 
 /// A sentence for each warning: what was found, and what to try. Nothing is deleted from T0 yet, so it has those of its inputs, rays and leaks
@@ -36,7 +36,7 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
         (mesh.facets.margin < 0 && !explains_cut, BODY_CUT),
         (
             2.0 * f64::from(mesh.facets.rounding)
-                > mesh.rules.root.edge_of(mesh.rules.level_surface),
+                > mesh.rules.root.edge_of(mesh.rules.level_deepest()),
             ROUNDED,
         ),
     ];
