@@ -56,8 +56,8 @@ fn main() {
 }
 
 /// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
-/// their own, if the heap has no room for them, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
-/// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
+/// their own if the heap has no room for them, as most large sets on a rank of a large mesh. Mappings are returned to the system when they are
+/// freed; with 940 M cells on one rank glibc would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
 /// needs as much again in every phase (a page fault takes 2 us on a virtual machine). Simulated ranks have a heap each, as ranks in processes
 /// have, unless the address space is too small: in a common one, a rank searches what all ranks have freed, which is not in its caches. That took a
 /// fifth of the CPU time of 1,024 ranks. Otherwise the thread that handles signals needs no heap of its own, which would take 64 MiB of address space.
