@@ -23,14 +23,19 @@ const ROUNDED: &str = "coordinates of STL files are f32 numbers, which are more 
 pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     let (leaks, is_final, keep) = (of_leaks(mesh, case_name), !mesh.is_base, mesh.rules.keep);
     let summary = &mesh.sides.summary;
-    let empty = empty_region(keep, summary).filter(|_| is_final && leaks.is_none());
+    let empty = empty_region(keep, summary);
     let flow_at_boundary = is_final && keep == Keep::Inside && summary.inside_reaches_boundary;
     let at_boundary = FLOW.replace("CASE", case_name);
     // These two already advise to enlarge the root.
-    let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
+    let explains_cut =
+        flow_at_boundary || keep == Keep::Outside && empty.is_some() && leaks == empty;
+    let empty = empty.filter(|_| is_final && leaks.is_none());
     let others = [
         (flow_at_boundary && leaks.as_ref() != Some(&at_boundary), &at_boundary[..]),
-        (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
+        (
+            summary.flow_misses_boundary && leaks.as_deref() != Some(FLOW_WITHOUT_FAR_FIELD),
+            FLOW_WITHOUT_FAR_FIELD,
+        ),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
         (mesh.facets.margin < 0 && !explains_cut, BODY_CUT),
@@ -51,7 +56,7 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     leaks.into_iter().chain(empty).chain(ambiguous).chain(others).collect()
 }
 
-/// The warning of a geometry that leaks, or that is open and bounds nothing.
+/// The warning of a geometry that leaks, that is open and bounds nothing, or of which what is kept is empty or cannot be the flow asked for.
 pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
@@ -66,7 +71,8 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
             )),
             _ if is_around && rules.keep == Keep::Inside => Some(FLOW.replace("CASE", case_name)),
             true => empty.or_else(|| Some(bounds_nothing(rules, case_name))),
-            false => empty.filter(|_| rules.keep == Keep::Inside),
+            _ if sides.summary.flow_misses_boundary => Some(FLOW_WITHOUT_FAR_FIELD.to_owned()),
+            false => empty.filter(|_| rules.keep != Keep::All),
         };
     };
     let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;

@@ -366,6 +366,16 @@ fn leaks_are_warnings_or_errors() {
         assert_eq!((warnings.len(), leaks), (1, json!([])));
         assert!(warnings[0].starts_with("the flow reaches the root's boundary"), "{warnings:?}");
         assert!(warnings[0].contains("`harness leak case.toml --from X,Y,Z`"), "{warnings:?}");
+        // An outer flow without an outside, or of seeds in the solid only, is none either.
+        for (facets, seeds, said) in [
+            (cuboid([-1.0; 3], [65.0; 3]), vec![], "nothing is outside the geometry"),
+            (box_in_box(), vec![[16.0, 32.0, 32.0]], "keep = outside, and the flow of no seed"),
+        ] {
+            let outer = Small { seeds, ..case(facets, Keep::Outside) };
+            let (warnings, leaks) = with_leaks(&outer, comm);
+            assert_eq!((warnings.len(), leaks), (1, json!([])), "{warnings:?}");
+            assert!(warnings[0].starts_with(said), "{warnings:?}");
+        }
         // The largest leaves, whose rays decide, are in the body, and the space around it has their side.
         let mut open = cuboid([3.0; 3], [61.0; 3]);
         open.retain(|f| f.iter().any(|v| v[0] != 3.0));
