@@ -7,7 +7,7 @@
 
 use crate::jsonl;
 use jiff::Timestamp;
-use run::engine::report::SECONDS_MAX;
+use run::engine::report::{CLOCKS_S, SECONDS_MAX};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -197,8 +197,6 @@ fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
     times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 
-/// How far the clock of a program may be from that of the harness, and from those of its phases.
-pub(super) const CLOCKS_S: f64 = 0.01;
 
 /// How far a sum may be from that of so many stored values.
 fn rounding(count: usize, sum: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Measured runs: one run of a setup, as a line of the record, and whether it is worth starting: a slow program is not started on a mesh that
 //! it would not finish.
 
-use super::entry::{CLOCKS_S, Comm, Line, Phase, Run, Setup, Spread};
+use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
 use super::machine::{cores, digest_of, digest_of_scripts};
 use crate::shown;
 use check::audit::audit_against;

@@ -411,14 +411,16 @@ fn a_proven_checker_that_crashes_is_a_failure() {
 }
 
 #[test]
-fn a_run_report_that_contradicts_the_mesh_or_the_case_is_detected() {
+fn a_run_report_that_contradicts_the_mesh_the_case_or_the_clock_is_detected() {
     let fixture = Fixture::new();
-    for (stated, why) in [
-        ("\"cells\": 2", "states 2 cells, and its mesh has 1"),
-        ("\"cells\": 1, \"facets\": 3", "reports 3 facets, and the case has "),
-        ("\"cells\": 1, \"facets\": 0", "reports 0 facets, and the case has "),
+    for (replaced, stated, why) in [
+        ("\"cells\": 1", "\"cells\": 2", "states 2 cells, and its mesh has 1"),
+        ("\"cells\": 1", "\"cells\": 1, \"facets\": 3", "reports 3 facets, and the case has "),
+        ("\"cells\": 1", "\"cells\": 1, \"facets\": 0", "reports 0 facets, and the case has "),
+        // Milliseconds.
+        ("_s\": 0.005", "_s\": 5e3", "reports a wall time of 5000 s, and ran for 0."),
     ] {
-        fixture.script("mesher", &HOLDS.replace("\"cells\": 1", stated));
+        fixture.script("mesher", &HOLDS.replace(replaced, stated));
         let outcome = fixture.verify(&["--no-mpi"]);
         let is_found = outcome.printed.contains(why);
         assert_eq!((outcome.code, is_found), (1, true), "{}", outcome.printed);

@@ -89,6 +89,9 @@ pub fn one_or_many<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
 /// Longest time that is believed, in seconds: 30 years.
 pub const SECONDS_MAX: f64 = 1e9;
 
+/// How far the clock of a program may be from that of the harness, and from those of its phases.
+pub const CLOCKS_S: f64 = 0.01;
+
 impl RunReport {
     /// Reads a run report.
     ///

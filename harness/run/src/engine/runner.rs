@@ -5,7 +5,7 @@ use super::failure::{End, Failure, Result};
 use super::layout::{Launcher, Layout, Ranks, RunOptions};
 use super::paths::{Input, Paths, on_path};
 use super::process::{self, Finished, Watch};
-use super::report::RunReport;
+use super::report::{CLOCKS_S, RunReport};
 use super::service::{self, Services};
 use super::templates::{LAUNCHER, Values, fill};
 use crate::import;
@@ -249,6 +249,12 @@ impl Engine {
                 "was to run on {ranks} ranks, but reports {reported}: if on MPI, it was built without it, or for another than that of {}",
                 self.launcher.program().display()
             ));
+        }
+        // As of milliseconds for seconds.
+        let longest_s = 1.01 * finished.time_wall_s + CLOCKS_S;
+        if let Some(stated) = report.time_wall_s.filter(|&time_s| time_s > longest_s) {
+            let ran = finished.time_wall_s;
+            return Err(format!("reports a wall time of {stated} s, and ran for {ran:.3} s"));
         }
         // The balance of ranks is that of this counter.
         let leaves = report.counters.get("leaves").filter(|of| of.len() == ranks);
