@@ -146,7 +146,7 @@ impl Ranks {
             rank.shared.iter().for_each(|by| *needs.entry(by).or_insert(0.0) += own);
         }
         for (rank, own) in self.all.iter().zip(more) {
-            all.push(("address space", rank.address_space, own * self.in_process));
+            all.push(("address space or data", rank.address_space, own * self.in_process));
             all.push(("control group", rank.control_group, needs[&rank.shared[1]]));
             all.push(("machine", rank.machine, needs[&rank.shared[0]]));
         }
@@ -176,7 +176,7 @@ mod tests {
         let tightest = ranks.tightest(&[40.0, 500.0, 50.0]).unwrap();
         assert_eq!((tightest.limit, tightest.needed_bytes), ("machine", 90));
         let tightest = ranks.tightest(&[0.0, 850.0, 0.0]).unwrap();
-        assert_eq!((tightest.limit, tightest.left_bytes), ("address space", 900));
+        assert_eq!((tightest.limit, tightest.left_bytes), ("address space or data", 900));
         assert_eq!(ranks.peaks(&[5.0, 50.0, 500.0]), [70, 100, 550]);
         let three_times = Amounts { bytes_sides: 90.0, ..Amounts::default() };
         assert_eq!(ranks.growth(&three_times), [26.0; 3]);

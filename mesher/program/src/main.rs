@@ -113,7 +113,7 @@ fn run_mpi(asked: &Result<Args, Error>) -> i32 {
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(
-            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            "the limit on its address space or data leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v, -d) by {:.0} MB",
             left / 1e6,
             (ADDRESS_SPACE_MPI - left) / 1e6
         ));

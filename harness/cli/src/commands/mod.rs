@@ -42,7 +42,7 @@ pub enum Command {
     Verify(Box<verify::Arguments>),
     /// Corrupt correct meshes in every catalogued way and test that the intended check detects it
     Selftest(selftest::Arguments),
-    /// Compare a candidate with a baseline: correctness, exact counters, instructions, time
+    /// Compare a candidate with a baseline: correctness, exact counters, memory, instructions, time
     Gate(Box<gate::Arguments>),
     /// Execute a study: series of runs, and targets that are met or missed; append every result to a record
     #[command(visible_alias = "targets")]
@@ -69,7 +69,7 @@ pub enum Command {
     Picture(Box<picture::Arguments>),
     /// Make a leaf-set directory from a mesh in another program's format
     Import(import::Arguments),
-    /// Report where two leaf-set directories differ and which rule of the definition decides
+    /// Report where two meshes differ and which rule of the definition decides
     Diff(diff::Arguments),
     /// Explain the size and the side of the leaf at a point
     Why(why::Arguments),

@@ -1,6 +1,6 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
-use crate::options::{Input, Output, number_in};
+use crate::options::{Input, Output, examples, number_in};
 use crate::output::put_forms;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// `harness track`.
 #[derive(Args, Debug)]
+#[command(after_help = examples(include_str!("../../../doc/track.md")))]
 pub struct Arguments {
     /// The history: JSON lines, one record per commit
     history: PathBuf,

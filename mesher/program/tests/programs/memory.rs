@@ -81,7 +81,7 @@ fn what_a_refusal_recommends_fits() {
     let plan = workspace.json("plan.json");
     assert_eq!(
         (&plan["fits"], &plan["tightest"]["limit"]),
-        (&false.into(), &"address space".into())
+        (&false.into(), &"address space or data".into())
     );
     let factor = plan["spacing_factor_fits"].as_f64().expect("a spacing fits");
     workspace.write("fits.toml", boxed(0.1 * factor, 0.0016 * factor));
