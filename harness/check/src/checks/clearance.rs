@@ -107,13 +107,14 @@ struct Boxes<'a> {
     tree: &'a Tree,
     /// Whether all of an octant with some content and level matters, or only parts of it; `None` if nothing does.
     matters: &'a dyn Fn(Handle, u8) -> Option<bool>,
-    /// By the index of a node: one more than the level for which the box was found, and the box. Equal octants seldom have two levels.
-    known: RefCell<Vec<u64>>,
+    /// By the index of a node: one more than the level for which the box was sought, whether there is one, and the box. Equal octants
+    /// seldom have two levels.
+    known: RefCell<Vec<(u8, bool, [[u8; 3]; 2])>>,
 }
 
 impl<'a> Boxes<'a> {
     fn new(tree: &'a Tree, matters: &'a dyn Fn(Handle, u8) -> Option<bool>) -> Self {
-        Self { tree, matters, known: RefCell::new(vec![0; tree.nodes()]) }
+        Self { tree, matters, known: RefCell::new(vec![Default::default(); tree.nodes()]) }
     }
 
     /// The box in an octant, in 256ths of its edge.
@@ -122,9 +123,9 @@ impl<'a> Boxes<'a> {
         if (self.matters)(handle, level)? {
             return Some(Region::WHOLE);
         }
-        let [tag, empty, x, y, z, to @ ..] = self.known.borrow()[handle.index()].to_le_bytes();
-        if tag == level + 1 {
-            return (empty == 0).then_some([[x, y, z], to]);
+        let (sought, is_found, known) = self.known.borrow()[handle.index()];
+        if sought == level + 1 {
+            return is_found.then_some(known);
         }
         let mut found: Option<[[u8; 3]; 2]> = None;
         for digit in 0..8 {
@@ -134,9 +135,8 @@ impl<'a> Boxes<'a> {
             let ends = |a: usize| [from[a].min(low[a]), to[a].max(high[a])];
             found = Some([0, 1].map(|end| [0, 1, 2].map(|a| ends(a)[end])));
         }
-        let [[x, y, z], [u, v, w]] = found.unwrap_or_default();
-        let known = [level + 1, u8::from(found.is_none()), x, y, z, u, v, w];
-        self.known.borrow_mut()[handle.index()] = u64::from_le_bytes(known);
+        let known = (level + 1, found.is_some(), found.unwrap_or_default());
+        self.known.borrow_mut()[handle.index()] = known;
         found
     }
 
