@@ -16,7 +16,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use contract::failure::{Failure, Result, uninterrupted};
@@ -108,7 +108,7 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary> {
         };
         // The errors of vtkio do not say what the system said.
         let mut bytes = Vec::new();
-        file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
+        file.write_xml(&mut bytes).map_err(|error| Failure::input(format!("{error:?}")))?;
         Ok(out.write_all(&bytes)?)
     })
 }
@@ -159,17 +159,16 @@ fn write(export: &Export<'_>, path: &Path, fill: Fill) -> Result<Summary> {
 }
 
 /// The polygons as triangles.
-fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<Facet>> {
+fn triangles(Front { root, faces, points, polygons }: &Front) -> Result<Vec<Facet>> {
     let point = |index: u32| to_user(&points.all[index as usize], root).map(|c| c as f32);
     let finest = faces.iter().map(|face| root.edge_of(face.square.level)).fold(f64::MAX, f64::min);
     let is_moved = |c: &f64| (c - f64::from(*c as f32)).abs() > finest / 100.0;
     let mut places = points.all.iter().map(|at| to_user(at, root));
     if let Some(at) = places.find(|at| at.iter().any(is_moved)) {
-        let why = format!(
+        return Err(Failure::input(format_args!(
             "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
              origin, or write a .vtp file"
-        );
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+        )));
     }
     let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
     for (face, corners) in faces.iter().zip(polygons.iter()) {
