@@ -150,7 +150,7 @@ pub struct Network {
     pub latency_s: f64,
     /// Bandwidth of a long message, in bytes per second.
     pub bandwidth_bytes_per_s: f64,
-    /// Whether a ping-pong measured them; otherwise the user gave them, or they are [`ASSUMED`].
+    /// Whether a ping-pong measured them; otherwise they are given, or [`ASSUMED`].
     pub measured: bool,
     /// Whether the user gave them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -166,11 +166,6 @@ impl Network {
     pub(super) fn is_possible(&self) -> bool {
         let is_finite = self.bandwidth_bytes_per_s.is_finite();
         is_finite && are_times([self.latency_s, 1.0 / self.bandwidth_bytes_per_s])
-    }
-
-    /// Whether the user gave them.
-    pub(crate) fn is_given(&self) -> bool {
-        !self.measured && *self != ASSUMED
     }
 
     /// Returns the time of a rank's messages, in seconds.

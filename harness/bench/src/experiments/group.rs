@@ -402,7 +402,7 @@ fn apart(
 ) -> Setup {
     let mut setup = run.setup.clone();
     let machine = session.map(|session| session.machine.label());
-    let given = network.filter(|network| network.is_given()).map(Network::to_string);
+    let given = network.filter(|network| network.given).map(Network::to_string);
     let origin = [machine, given, Some(format!("program {}", run.program))];
     let origin = origin.into_iter().flatten().collect::<Vec<_>>().join("; ");
     setup.engine += &programs.suffix(&run.setup.engine, &origin);

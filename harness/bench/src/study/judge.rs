@@ -61,7 +61,7 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let mut sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
-    let given = |(session, of): (_, Network)| (session, of.is_given().then(|| of.to_string()));
+    let given = |(session, of): (_, Network)| (session, of.given.then(|| of.to_string()));
     let networks: Vec<_> = lines.iter().filter_map(Line::network).map(given).collect();
     if let Some((_, last)) = networks.iter().rfind(|(session, _)| sessions.contains(session)) {
         sessions.retain(|name| networks.iter().all(|(of, given)| of != name || given == last));
@@ -169,7 +169,7 @@ impl Judged {
 mod tests {
     use super::super::measure::MEASURES;
     use super::*;
-    use crate::experiments::entry::{ASSUMED, Comm, Machine, NoResult, Session, TARGETS};
+    use crate::experiments::entry::{Comm, Machine, NoResult, Session, TARGETS};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -256,7 +256,7 @@ mod tests {
                 latency_s: 1.0,
                 bandwidth_bytes_per_s: 1e9,
                 measured,
-                ..ASSUMED
+                given: !measured,
             })
         };
         let lines = [

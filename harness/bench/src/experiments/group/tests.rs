@@ -181,7 +181,8 @@ fn a_program_without_any_run_on_a_case_is_named() {
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
     let network = |latency_s: f64, measured: bool| {
-        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e30, measured, ..ASSUMED })
+        let given = !measured;
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e30, measured, given })
     };
     let mut sim = run(Comm::Sim, 9, &[("a", &[1.0, 1.0])]);
     sim.phases[0].messages = Spread::of(&[1.0, 1.0]);
