@@ -34,9 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let mut code = EXIT_HOLDS;
     for main in &arguments.check {
         let mut all = 0;
-        let (texts, is_outdated) = texts(main, &arguments.directory)?;
-        let mut has_failed = is_outdated;
-        for (path, text) in texts {
+        for (path, text) in texts(main, &arguments.directory)? {
             let shown = path.display();
             let Checked { compared, by_hand, findings } = check(&text, &numbers);
             findings.iter().for_each(|finding| println!("{shown}, {finding}"));
@@ -44,10 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
             println!(
                 "{shown}: {compared} numbers compared, {by_hand} of them by hand, with any result; {number} findings"
             );
-            has_failed |= number > 0;
+            code = if number > 0 { EXIT_FAILED } else { code };
             all += compared;
         }
-        code = if has_failed { EXIT_FAILED } else { code };
         if all == 0 {
             let why = "has no number that the record could have, so nothing was compared";
             eprintln!("harness: {} {why}", main.display());
@@ -58,12 +55,9 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 /// Reads a text and those that it includes, without figures of reports, and without what the report in `directory` has just written.
-/// Also returns whether a figure is that of an earlier report, or a text is not found because no text defines its directory.
-fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)> {
+fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>> {
     let own = ["numbers.tex", "models.tex"].map(|name| fs::read(directory.join(name)).ok());
-    let (mut paths, mut all, mut next, mut is_old) = (vec![main.to_owned()], Vec::new(), 0, false);
-    // A directory may be defined in another text than the one that uses it.
-    let mut whole = String::new();
+    let (mut paths, mut all, mut next) = (vec![main.to_owned()], Vec::new(), 0);
     while let Some(path) = paths.get(next).cloned() {
         next += 1;
         // Numbers and commands are the same in any encoding that LaTeX reads.
@@ -71,12 +65,10 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let head = r"\providecommand{\figures}{figures}";
         let is_figure = text.lines().take(3).any(|line| line == head);
-        is_old |= is_figure && is_outdated(&path, &text, directory)?;
         if is_figure || own.contains(&Some(bytes)) {
             continue;
         }
-        whole += &(text.clone() + "\n");
-        for name in included(&whole)[0].iter().filter(|name| !name.starts_with('\\')) {
+        for name in included(&text) {
             // As LaTeX does: relative to the main text, whichever includes it.
             let [named, tex] = ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
             let file = if named.is_file() || name.ends_with(".tex") { named } else { tex };
@@ -86,46 +78,7 @@ fn texts(main: &Path, directory: &Path) -> Result<(Vec<(PathBuf, String)>, bool)
         }
         all.push((path, text));
     }
-    let [texts, pictures] = included(&whole);
-    let unknown = texts.iter().filter(|name| name.starts_with('\\'));
-    let why = "is not compared: no text defines its directory with \\newcommand";
-    is_old |= unknown.inspect(|name| println!("{name} {why}")).count() > 0;
-    for name in pictures.iter().flat_map(|name| ["", ".pdf", ".png"].map(|end| name.clone() + end))
-    {
-        let copy = main.with_file_name(name);
-        let made = directory.join("figures").join(copy.file_name().unwrap_or_default());
-        is_old |= differs(&copy, &made)?;
-    }
-    Ok((all, is_old))
-}
-
-/// Whether a file differs from that of the report, if both are there; prints it.
-fn differs(copy: &Path, made: &Path) -> Result<bool> {
-    let differs = copy.is_file() && made.is_file() && fs::read(copy)? != fs::read(made)?;
-    if differs {
-        println!("{}: differs from that of the report: copy it again", copy.display());
-    }
-    Ok(differs)
-}
-
-/// Whether a figure, unless it is a list of them, is none of the report's in `directory`, or files beside it, or below a list, differ from
-/// those of the same name there; prints them.
-fn is_outdated(figure: &Path, text: &str, directory: &Path) -> Result<bool> {
-    let list = fs::read_to_string(directory.join("figures.tex"))?;
-    let name = format!(r"{{\figures/{}}}", figure.file_name().unwrap_or_default().display());
-    let mut is_outdated = !text.starts_with("% Made by") && !list.contains(&name);
-    if is_outdated {
-        println!("{}: the report has no figure of this name", figure.display());
-    }
-    let made = fs::read_dir(directory.join("figures"))?.flatten().map(|entry| entry.path());
-    for made in made.chain([directory.join("figures.tex")]) {
-        let is_read = made.extension().is_some_and(|of| of == "tex" || of == "csv");
-        for of in ["", "figures"] {
-            let copy = figure.with_file_name(of).join(made.file_name().unwrap_or_default());
-            is_outdated |= is_read && differs(&copy, &made)?;
-        }
-    }
-    Ok(is_outdated)
+    Ok(all)
 }
 
 /// Reads records, writes the report into `directory` and prints a summary; returns the results.
@@ -190,51 +143,29 @@ pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
-    const FIGURE: &str = "% Requires x\n\\providecommand{\\figures}{figures}\n";
-
-    /// The texts of a paper that are read, beside a copy of a report's figures, one of which is another.
-    fn read_of(paper: &str, changed: &str) -> (usize, bool) {
+    /// The number of texts of a paper that are read, beside copies of files of a report; 0 if one cannot be read.
+    fn read_of(paper: &str) -> usize {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let put = |name: &str, text: &str| {
             fs::create_dir_all(at(name).parent().unwrap()).unwrap();
             fs::write(at(name), text).unwrap();
         };
-        put("report/figures.tex", r"% Made by \input{\figures/a.tex}");
-        for name in ["a.tex", "a.csv", "b.pdf"] {
-            put(&format!("report/figures/{name}"), FIGURE);
-            put(&format!("of paper/{name}"), FIGURE);
-        }
-        put(&format!("of paper/{changed}"), &format!("{FIGURE}%"));
         put("report/models.tex", "98.76543");
         put("of paper/models.tex", "98.76543");
         put("of paper/old.tex", "98.76542");
-        put("head.tex", r"\newcommand{\here}{of paper}");
+        put("of paper/a.tex", "% Requires x\n\\providecommand{\\figures}{figures}\n");
         put("paper.tex", paper);
-        let (texts, is_old) = texts(&at("paper.tex"), &at("report")).unwrap();
-        (texts.len(), is_old)
+        texts(&at("paper.tex"), &at("report")).map_or(0, |texts| texts.len())
     }
 
     #[test]
-    fn figures_of_an_earlier_report_are_found_however_a_text_includes_them() {
-        let by_path = r"\input{of paper/a}\input{head}";
-        let by_macro = r"\input{\here/a}\input{head}";
-        for paper in [by_path, by_macro] {
-            assert_eq!(read_of(paper, "other"), (2, false));
-            for changed in ["a.csv", "a.tex"] {
-                assert_eq!(read_of(paper, changed), (2, true), "{paper} {changed}");
-            }
-        }
-        for picture in
-            [r"\includegraphics[width=1cm]{of paper/b}", r"\includegraphics{of paper/b.pdf}"]
-        {
-            assert_eq!(read_of(picture, "a.csv"), (1, false));
-            assert_eq!(read_of(picture, "b.pdf"), (1, true), "{picture}");
-        }
+    fn included_texts_are_read_but_for_files_of_a_report() {
+        assert_eq!(read_of(r"\input{of paper/a}\input{\figures/a}"), 1);
         // A copy of what the report has just written has nothing to compare; an older one has.
-        assert_eq!(read_of(r"\input{of paper/models}", "other"), (1, false));
-        assert_eq!(read_of(r"\input{of paper/old}", "other"), (2, false));
-        // One that is not found is none that agrees.
-        assert_eq!(read_of(r"\input{\there/a}", "other"), (1, true));
+        assert_eq!(read_of(r"\input{of paper/models}"), 1);
+        assert_eq!(read_of(r"\input{of paper/old}"), 2);
+        // A directory that is a macro is not looked up.
+        assert_eq!(read_of(r"\input{\there/a}"), 0);
     }
 }

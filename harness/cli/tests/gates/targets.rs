@@ -109,22 +109,6 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     for made in ["numbers.tex", "copy.tex"] {
         assert!(!whole.printed.contains(made), "{}", whole.printed);
     }
-    // A figure of an earlier report, of which only the values changed.
-    let list = fs::read_to_string(fixture.path("out/figures.tex")).unwrap();
-    fixture.write("old/figures.tex", &list);
-    for place in ["out", "old"] {
-        fixture.write(&format!("{place}/figures/a.csv"), "new");
-    }
-    let with_figures = || check(&format!("\\result{{{key}}}\\input{{old/figures}}"));
-    assert_eq!(with_figures().code, 0);
-    fixture.write("old/figures/a.csv", "old");
-    let old = with_figures();
-    assert!(old.code == 1 && old.printed.contains("a.csv: differs"), "{}", old.printed);
-    // And one that the report no longer has.
-    fixture.write("speedup-old.tex", figures);
-    let gone = check(&format!("\\result{{{key}}}\\input{{speedup-old}}"));
-    let why = "speedup-old.tex: the report has no figure of this name";
-    assert!(gone.code == 1 && gone.printed.contains(why), "{}", gone.printed);
     // Numbers are ASCII, whatever the encoding.
     fs::write(fixture.path("paper.tex"), b"M\xfcller: 98.76543").unwrap();
     let latin = fixture.harness("report out --record out/r.jsonl --check paper.tex");

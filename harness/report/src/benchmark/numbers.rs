@@ -166,28 +166,11 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
 /// How a text includes another. The directory of `\import` has its slash.
 const INCLUDED: &str = r#"\\(?:(?:sub)?import\s*\{\s*([^}]*?)\s*\}\s*\{\s*([^}]*?)\s*\}|(?:input|include|subfile)(?:\s*\{\s*"?([^}"]*?)"?\s*\}|[ \t]+"?([^\s\\{}"]+)))"#;
 
-/// How it includes a picture.
-const PICTURED: &str = r"\\includegraphics\*?\s*(?:\[[^\]]*\]\s*)*\{\s*([^}]*?)\s*\}";
-
-/// A macro that stands for a directory.
-const DEFINED: &str = r"\\(?:[a-z]+command\*?|def)\s*\{?\s*(\\[a-zA-Z]+)\s*\}?\s*\{([^{}\\#]*)\}";
-
-/// The texts and the pictures that a text includes, as it names them, with the directories for which it has macros, as last defined before;
-/// without those that an argument of a macro names in such a directory.
-pub fn included(text: &str) -> [Vec<String>; 2] {
-    let code = without_comments(text);
-    let [defined, texts, pictures] = [DEFINED, INCLUDED, PICTURED].map(pattern);
-    let place = |of: &Captures| of.get(0).map_or(0, |all| all.start());
-    let value = |of: Captures| (place(&of), [1, 2].map(|part| format!("{}/", &of[part])));
-    let defined: Vec<(usize, [String; 2])> = defined.captures_iter(&code).map(value).collect();
-    let name = |of: Captures| -> Option<String> {
-        let name: String = of.iter().skip(1).flatten().map(|m| m.as_str()).collect();
-        let is_fixed = !(name.starts_with('\\') && name.contains('#'));
-        let (before, after) = defined.split_at(defined.partition_point(|(at, _)| *at < place(&of)));
-        let values = before.iter().rev().chain(after);
-        is_fixed.then(|| values.fold(name, |name, (_, [from, to])| name.replace(from, to)))
-    };
-    [texts, pictures].map(|of| of.captures_iter(&code).filter_map(name).collect())
+/// The texts that a text includes, as it names them, without figures of a report.
+pub fn included(text: &str) -> Vec<String> {
+    let (code, included) = (without_comments(text), pattern(INCLUDED));
+    let name = |of: Captures| of.iter().skip(1).flatten().map(|m| m.as_str()).collect::<String>();
+    included.captures_iter(&code).map(name).filter(|name| !name.starts_with(r"\figures/")).collect()
 }
 
 /// In an address, `%` begins no comment.
@@ -301,19 +284,8 @@ mod tests {
     fn included_texts_are_found() {
         let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}\\input g.tex\n\
                     \\subfile{h}\\import{i/}{j}\\subimport{k/}{l.tex}\\input{\"m n/o\"}\\inputlineno{p}";
-        let [texts, pictures] = included(text);
-        let expected = ["a", "c.tex", "e", r"\figures/f", "g.tex", "h", "i/j", "k/l.tex", "m n/o"];
-        assert_eq!(texts, expected);
-        assert_eq!(pictures, ["d"]);
-        for defined in [r"\newcommand{\of}{x/y}", r"\renewcommand*\of{x/y}", r"\def \of {x/y}"] {
-            let uses = r"\input{\of/a}\input{\offset/b}\includegraphics[width=9cm,\n scale=2]{\of/c.pdf}\newcommand\D[1]{\input{\of/#1}}";
-            let [texts, pictures] = included(&format!("{defined}{uses}"));
-            assert_eq!(texts, ["x/y/a", r"\offset/b"]);
-            assert_eq!(pictures, ["x/y/c.pdf"]);
-        }
-        let of_two =
-            r"\input{\of/a}\newcommand{\of}{x}\input{\of/b}\renewcommand{\of}{y}\input{\of/c}";
-        assert_eq!(included(of_two)[0], ["x/a", "x/b", "y/c"]);
+        let expected = ["a", "c.tex", "e", "g.tex", "h", "i/j", "k/l.tex", "m n/o"];
+        assert_eq!(included(text), expected);
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {
