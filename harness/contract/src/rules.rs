@@ -40,9 +40,10 @@ impl Manifest {
         (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 1e-9 * self.root.edge)
     }
 
-    /// Deepest level that the surface or a box requires.
+    /// Deepest level that the surface or a box requires. A box without a volume, as one beyond the root, meets nothing.
     pub fn level_deepest(&self) -> u8 {
-        self.boxes.iter().map(|b| b.level).fold(self.level_surface, u8::max)
+        let boxes = self.boxes.iter().filter(|b| b.meets(&Octant::ROOT));
+        boxes.map(|b| b.level).fold(self.level_surface, u8::max)
     }
 
     /// Whether a box requires leaves finer than the surface. Gradation may then refine crossing leaves.
@@ -115,6 +116,9 @@ mod tests {
         assert_eq!(with(2).box_that_splits(&near), None);
         assert_eq!(with(3).box_that_splits(&Octant::ROOT.child(0).child(1)), None);
         assert!(with(4).has_box_finer_than_surface() && !with(3).has_box_finer_than_surface());
+        // One beyond the root, on the lattice.
+        let beyond = ExtentBox { min: [1 << 27, 0, 0], max: [1 << 27; 3], level: 9 };
+        assert_eq!(Manifest { boxes: vec![beyond], ..inputs() }.level_deepest(), 3);
     }
 
     #[test]

@@ -66,8 +66,12 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; p4est since mid-2020 loads names that end in .30.p8est, and no others";
-    Ok(Summary { leaves, bytes, notes: vec![format!("{} {what}", count - leaves)] })
+    let since = if shift > 0 { "since" } else { "before" };
+    let note = format!(
+        "{} more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; coordinates are those of p4est {since} mid-2020, as those since then are written if the name ends in .30.p8est",
+        count - leaves
+    );
+    Ok(Summary { leaves, bytes, notes: vec![note] })
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.

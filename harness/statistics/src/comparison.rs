@@ -21,8 +21,8 @@ pub fn rounds_min(alpha: f64) -> usize {
 /// bootstrap samples.
 const SAMPLES: usize = 20_000;
 
-/// Greatest number of random permutations for `p`: many tests at once need small p-values.
-const PERMUTATIONS_MAX: usize = 50_000;
+/// Number of random permutations for `p`, unless many tests at a small level need more.
+const PERMUTATIONS: usize = 50_000;
 
 /// Number of permutations with a larger effect after which `p` is known well enough (Besag and Clifford, 1991).
 const EXCEEDANCES_MAX: usize = 100;
@@ -65,8 +65,9 @@ pub fn compare(rounds: &[Round], alpha: f64, tests: usize, seed: u64) -> Compari
     let effect = trimmed_mean(differences.iter().copied());
     let mut permuted_effect =
         || trimmed_mean(rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r))).abs();
+    let most = PERMUTATIONS.max((2.0 * tests as f64 / alpha) as usize);
     let (mut as_large, mut drawn) = (0, 0);
-    while drawn < PERMUTATIONS_MAX && as_large < EXCEEDANCES_MAX {
+    while drawn < most && as_large < EXCEEDANCES_MAX {
         as_large += usize::from(permuted_effect() >= effect.abs());
         drawn += 1;
     }

@@ -16,7 +16,7 @@ mod subject;
 pub mod time;
 
 use crate::emptied;
-use crate::experiments::machine;
+use crate::experiments::machine::{self, digest_of};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use contract::failure::{Failure, Result};
@@ -109,6 +109,10 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport> {
     let bench = Bench { options, rules, cases, programs, candidate, baseline, place };
     report.require_layers = options.require_layers;
     run_layers(&bench, &mut report)?;
+    for Subject { engine, measured, .. } in bench.baseline.iter().chain([&bench.candidate]) {
+        let why = format!("{} was replaced while it was measured: repeat the gate", measured.named);
+        Failure::unless(digest_of(engine.files()) == measured.program, why)?;
+    }
     report.interrupted = interrupt::requested();
     report.time_s = start.elapsed().as_secs_f64();
     report.check_invariants();

@@ -321,10 +321,14 @@ impl Session<'_> {
             }
             match self.of_run(name) {
                 Ok(point) => points.push(point),
-                Err(failure) if failure.is_interrupt() => return Err(failure),
-                Err(Failure { why, .. }) => {
-                    let why = format!("mesh {}: {why}", study.run[name].mesh);
-                    return Ok(unjudged(row, true, why));
+                Err(failure) => {
+                    // Of a mesh without a spacing, a run at any is one of this name.
+                    let (spec, mesh) = (&study.run[name], &study.mesh[&study.run[name].mesh]);
+                    let (spacing, n) = (mesh.spacing_min, mesh.layer_cells_min);
+                    let setup = spec.setup(spacing.unwrap_or_default(), n.unwrap_or_default());
+                    let why = format!("mesh {}: {}", spec.mesh, failure.why);
+                    self.failed(setup, Failure { why, ..failure })?;
+                    return Ok(judge(study, row, &self.lines));
                 }
             }
         }

@@ -43,7 +43,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     boxes_met(tree, terms, result);
     crossing_fine(tree, terms, result);
     none_finer(tree, terms, result);
-    let without = tree.kinds(tree.root) & 1 << Side::Crossing as u8 == 0 && terms.boxes.is_empty();
+    let without = tree.kinds(tree.root) & 1 << Side::Crossing as u8 == 0
+        && !terms.boxes.iter().any(|b| b.meets(&Octant::ROOT));
     let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
     result.requires(some_leaves(subject.tree_with_deleted()).or_else(|| without.then(uncrossed)));
 }

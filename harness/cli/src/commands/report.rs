@@ -116,11 +116,11 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>> {
         if repeated > 0 {
             eprintln!("harness: {shown}: {repeated} lines repeat earlier ones and are skipped");
         }
-        all.push(read);
+        all.extend(read);
     }
-    // The last machine and the last build count, whatever the names of the files.
-    all.sort_by_key(|lines: &Vec<Line>| lines.last().map(|line| line.time_utc.clone()));
-    Ok(all.into_iter().flatten().collect())
+    // The first machine and build keep their names, and the last ones count, whatever file they are in.
+    all.sort_by(|a: &Line, b| a.time_utc.cmp(&b.time_utc));
+    Ok(all)
 }
 
 /// The records in a directory; other files of JSON lines, such as a history, are none.

@@ -134,6 +134,7 @@ impl Fixture {
             .args(arguments.split(' '))
             .current_dir(self.0.path())
             .env("HARNESS_ROOT", self.0.path())
+            .env("XDG_CACHE_HOME", self.path("cache"))
             .env(name, value);
         command.env_remove("GITHUB_STEP_SUMMARY");
         let output = command.output().unwrap();

@@ -417,7 +417,8 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
     fixture.write("other/program", program);
     fixture.write(
         "other/make",
-        "mkdir -p $1/lib && cp program $1/lib/ && printf %s%s $(cat words) $MORE >$1/lib/words && chmod +x $1/lib/program && test \"$RUSTFLAGS\" != -bad\n",
+        "d=$PWD; while [ $d != / ]; do d=$(dirname $d); test ! -e $d/settings || exit 1; done\n\
+         mkdir -p $1/lib && cp program $1/lib/ && printf %s%s $(cat words) $MORE >$1/lib/words && chmod +x $1/lib/program && test \"$RUSTFLAGS\" != -bad\n",
     );
     git("init --quiet");
     for words in ["40", "41"] {
@@ -426,6 +427,8 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
         git(&format!("commit --quiet -m words-{words}"));
     }
     fixture.write("other/words", "43");
+    // Builds of revisions do not find what the working tree has, as cargo does in directories above.
+    fixture.write("other/settings", "");
     let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
     let build = "[build]\ncommand = ['sh', 'make', '{target}']\nprogram = '{target}/lib/program'\n";
     fixture.write("built.toml", &format!("{engine}{build}"));
@@ -498,6 +501,17 @@ fn a_gate_that_compared_nothing_is_not_green() {
     let none = fixture.harness(&format!("{gate} --baseline engine"));
     assert_eq!(none.code, 2, "{}", none.printed);
     assert!(none.printed.contains("it has no [[case]]"), "{}", none.printed);
+}
+
+#[test]
+fn a_program_that_is_replaced_while_it_is_measured_gives_no_result() {
+    let fixture = Fixture::new();
+    let engine = fs::read_to_string(fixture.path("engine")).unwrap();
+    fixture.program("moving", &format!("{engine}\necho '#' >> \"$0\"\n"));
+    let gate = "gate --engine engine.toml --rules gate.toml --layers counters";
+    let outcome = fixture.harness(&format!("{gate} --baseline engine --candidate moving"));
+    let is_said = outcome.printed.contains("moving was replaced while it was measured");
+    assert!(outcome.code == 2 && is_said, "{}", outcome.printed);
 }
 
 #[test]

@@ -56,6 +56,20 @@ const TARGETS_COMMAND: &str = "targets targets.toml --mesher ./mesher --network 
 const SHOW: &str = "targets targets.toml --show";
 
 #[test]
+fn a_mesh_whose_spacing_is_not_found_fails_by_the_record_too() {
+    let fixture = scripted();
+    let study = "mesh.body = { case = 'case.toml', cells = 1e5 }\nrun.one = { mesh = 'body', comm = 'solo' }\n\
+                 [[row]]\nname = 'r'\nrun = 'one'\nmeasure = 'seconds'\nat_most = 9\n";
+    fixture.write("targets.toml", study);
+    fixture.program("mesher", "#!/bin/sh\nexit 70\n");
+    for command in [TARGETS_COMMAND, SHOW] {
+        let outcome = fixture.harness(&format!("{command} --record r.jsonl"));
+        let is_said = outcome.printed.contains("FAILED: run one failed: mesh body: ");
+        assert!(outcome.code == 1 && is_said, "{}", outcome.printed);
+    }
+}
+
+#[test]
 fn met_targets_succeed_and_the_record_gives_the_same_table() {
     let fixture = scripted();
     let only = "--only rate --record out/r.jsonl";

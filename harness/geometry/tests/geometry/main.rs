@@ -103,6 +103,13 @@ fn the_rim_of_a_half_model_in_a_face_of_the_root_is_no_opening() {
     };
     // No leaf fits between the rim and a face that is less than a cell away.
     assert_eq!([0.0, 1.0, -0.2, -0.25, -1.0].map(openings), [0, 0, 0, 1, 1]);
+    // A box beyond the root has no cells there, of whatever size.
+    let mut half = cuboid([-15.875, -2.0, -2.0], [-8.0, 2.0, 2.0]);
+    half.retain(|f| f.iter().any(|v| v[0] != -15.875));
+    let beyond = "[[box]]\nmin = [-20.0, -3.0, -3.0]\nmax = [-17.0, 3.0, 3.0]\nspacing = 0.05";
+    for rules in ["", beyond] {
+        assert_eq!(count(&case(&half, rules), Kind::Openings), 0, "{rules}");
+    }
 }
 
 #[test]

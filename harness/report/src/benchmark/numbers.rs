@@ -3,7 +3,7 @@
 //!
 //! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. A partition that
 //! was chosen follows the experiment, as in `weights-metis-unit`, and so does n in the experiment `layers`: `layers-n16`. Otherwise the same
-//! setup with another n has a number at its end: `speedup-2`.
+//! setup with another n has a number before its quantity: `projected-2/speedup`.
 //!
 //! `harness report DIR --check paper.tex` compares the numbers of a text with the record. A finding is a `\result` of a key that the record
 //! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
