@@ -1,6 +1,6 @@
 //! Errors that a user can correct; bugs panic instead.
 //!
-//! Exit codes: 0 success, 1 a geometry that leaks or a flow that is empty, on request, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 75 a rank that stalls, 130 interrupted.
+//! Exit codes: 0 success, 1 a geometry or a flow that --strict refuses, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 75 a rank that stalls, 130 interrupted.
 
 use files::OUT_OF_MEMORY;
 use ranks::{Comm, pack_bytes, unpack_bytes};
@@ -22,7 +22,7 @@ impl Error {
         Self { exit_code, message: message.to_string() }
     }
 
-    /// The geometry leaks or the flow is empty, and the user wants no mesh then.
+    /// A geometry or a flow of which the user wants no mesh.
     pub fn leak(message: impl Display) -> Self {
         Self::new(1, message)
     }

@@ -86,6 +86,11 @@ pub struct ExtentBox {
 }
 
 impl ExtentBox {
+    /// Whether the box has a volume in the root. One beyond it has none, as boxes are clamped to the root, and meets nothing.
+    pub fn is_in_root(&self) -> bool {
+        self.meets(&Octant::ROOT)
+    }
+
     /// Whether the interiors of the box and of an octant meet.
     pub fn meets(&self, octant: &Octant) -> bool {
         let (low, high) = octant.bounds();

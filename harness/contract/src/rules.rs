@@ -40,9 +40,9 @@ impl Manifest {
         (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 1e-9 * self.root.edge)
     }
 
-    /// Deepest level that the surface or a box requires. A box without a volume, as one beyond the root, meets nothing.
+    /// Deepest level that the surface or a box requires.
     pub fn level_deepest(&self) -> u8 {
-        let boxes = self.boxes.iter().filter(|b| b.meets(&Octant::ROOT));
+        let boxes = self.boxes.iter().filter(|b| b.is_in_root());
         boxes.map(|b| b.level).fold(self.level_surface, u8::max)
     }
 

@@ -66,12 +66,14 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    let since = if shift > 0 { "since" } else { "before" };
-    let note = format!(
-        "{} more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; coordinates are those of p4est {since} mid-2020, as those since then are written if the name ends in .30.p8est",
-        count - leaves
-    );
-    Ok(Summary { leaves, bytes, notes: vec![note] })
+    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; p4est";
+    let whose = match shift {
+        0 => {
+            "before mid-2020 loads this file: a name that ends in .30.p8est makes one for those since"
+        }
+        _ => "since mid-2020 loads this file, and none before",
+    };
+    Ok(Summary { leaves, bytes, notes: vec![format!("{} {what} {whose}", count - leaves)] })
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.

@@ -6,7 +6,7 @@ use contract::case::{Case, Facet};
 use contract::failure::{Failure, Result};
 use contract::lattice::Root;
 use contract::manifest::{Enclosed, ExtentBox, Keep};
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::LEVEL_MAX;
 use contract::parity::Parity;
 use contract::stl::{self, Body};
 use parry3d_f64::bounding_volume::BoundingVolume as _;
@@ -123,7 +123,7 @@ impl Input {
     pub fn cell_in(&self, region: &Aabb) -> Option<f64> {
         let corner = |at| Point::from(self.case.root.to_user(at));
         let meets = |b: &&ExtentBox| Aabb::new(corner(b.min), corner(b.max)).intersects(region);
-        let boxes = self.case.boxes.iter().filter(|b| b.meets(&Octant::ROOT));
+        let boxes = self.case.boxes.iter().filter(|b| b.is_in_root());
         let edges = boxes.filter(meets).map(|b| self.case.root.edge_of(b.level));
         self.cell.map(|cell| edges.fold(cell, f64::min))
     }

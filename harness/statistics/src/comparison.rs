@@ -65,13 +65,13 @@ pub fn compare(rounds: &[Round], alpha: f64, tests: usize, seed: u64) -> Compari
     let effect = trimmed_mean(differences.iter().copied());
     let mut permuted_effect =
         || trimmed_mean(rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r))).abs();
-    let most = PERMUTATIONS.max((2.0 * tests as f64 / alpha) as usize);
+    let resolving = (2.0 * tests as f64 / alpha) as usize;
     let (mut as_large, mut drawn) = (0, 0);
-    while drawn < most && as_large < EXCEEDANCES_MAX {
+    while drawn < resolving.max(PERMUTATIONS) && as_large < EXCEEDANCES_MAX {
         as_large += usize::from(permuted_effect() >= effect.abs());
         drawn += 1;
     }
-    let permuted = sorted((0..SAMPLES / 4).map(|_| permuted_effect()));
+    let permuted = sorted((0..resolving.max(SAMPLES / 4)).map(|_| permuted_effect()));
     let of_baseline = rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE);
     let of_baseline: Vec<f64> = of_baseline.collect();
     let null_effects = sorted((0..SAMPLES).map(|_| {

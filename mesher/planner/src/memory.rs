@@ -50,7 +50,7 @@ struct Rank {
 pub struct Tightest {
     /// Its name.
     pub limit: &'static str,
-    /// Bytes that it leaves: to a process if it limits the address space, otherwise to the ranks of one machine or of one container in it.
+    /// Bytes that it leaves: to a process if it limits the address space or the data, otherwise to the ranks of one machine or of one container in it.
     pub left_bytes: u64,
     /// Bytes that these would take beyond what they have.
     pub needed_bytes: u64,

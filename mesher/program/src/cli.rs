@@ -21,7 +21,7 @@ pub const UNPRINTED: i32 = 4;
 
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
-/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 no mesh of this geometry (--strict), 2 unusable
+/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry or the flow is unusable (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
 /// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; a mesh that is complete stays if only its report could not be made or written (4, 70, 71), a rank stalls after that (75) or a second signal arrives (130).
 #[derive(Clone, Parser)]
@@ -67,7 +67,7 @@ pub struct Args {
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]
     pub force: bool,
-    /// Make no mesh of a geometry that leaks between spacings or bounds nothing, or of a flow that is empty or on the wrong side, which are warnings otherwise, but end with exit code 1
+    /// End with exit code 1, without a mesh, if the geometry leaks between spacings or bounds nothing, or the flow is empty or on the wrong side; otherwise these are warnings
     #[arg(long, conflicts_with = "plan")]
     strict: bool,
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted

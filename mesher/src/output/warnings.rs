@@ -27,15 +27,11 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     let flow_at_boundary = is_final && keep == Keep::Inside && summary.inside_reaches_boundary;
     let at_boundary = FLOW.replace("CASE", case_name);
     // These two already advise to enlarge the root.
-    let explains_cut =
-        flow_at_boundary || keep == Keep::Outside && empty.is_some() && leaks == empty;
+    let explains_cut = flow_at_boundary || empty.is_some() && keep == Keep::Outside;
     let empty = empty.filter(|_| is_final && leaks.is_none());
     let others = [
-        (flow_at_boundary && leaks.as_ref() != Some(&at_boundary), &at_boundary[..]),
-        (
-            summary.flow_misses_boundary && leaks.as_deref() != Some(FLOW_WITHOUT_FAR_FIELD),
-            FLOW_WITHOUT_FAR_FIELD,
-        ),
+        (flow_at_boundary, &at_boundary[..]),
+        (is_final && summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
         (!mesh.rules.boxes.iter().all(|b| b.meets([0; 3], ROOT_EDGE)), BOXES_WITHOUT_EFFECT),
         (mesh.facets.total == 0, NO_FACETS),
         (mesh.facets.margin < 0 && !explains_cut, BODY_CUT),
@@ -52,7 +48,9 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
              holes and remove single sheets there, or give seeds if the root cuts the geometry on purpose"
         )
     });
-    let others = others.into_iter().filter(|other| other.0).map(|other| other.1.to_owned());
+    let is_new = |(is_so, what): &(bool, &str)| *is_so && leaks.as_deref() != Some(what);
+    let others: Vec<_> =
+        others.into_iter().filter(is_new).map(|(_, what)| what.to_owned()).collect();
     leaks.into_iter().chain(empty).chain(ambiguous).chain(others).collect()
 }
 
@@ -61,7 +59,7 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
     let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let Mesh { rules, facets, sides, .. } = mesh;
-        let empty = empty_region(rules.keep, &sides.summary);
+        let empty = empty_region(rules.keep, &sides.summary).filter(|_| rules.keep != Keep::All);
         // Nothing but an opening joins what surrounds all facets with what rays take for the inside, unless a seed lies there.
         let is_around = facets.margin > 0 && sides.summary.inside_reaches_boundary;
         return match mesh.bounds_nothing {
@@ -70,9 +68,9 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
                  `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or increase spacing_min"
             )),
             _ if is_around && rules.keep == Keep::Inside => Some(FLOW.replace("CASE", case_name)),
-            true => empty.or_else(|| Some(bounds_nothing(rules, case_name))),
-            _ if sides.summary.flow_misses_boundary => Some(FLOW_WITHOUT_FAR_FIELD.to_owned()),
-            false => empty.filter(|_| rules.keep != Keep::All),
+            _ if empty.is_some() => empty,
+            true => Some(bounds_nothing(rules, case_name)),
+            false => sides.summary.flow_misses_boundary.then(|| FLOW_WITHOUT_FAR_FIELD.to_owned()),
         };
     };
     let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;

@@ -192,7 +192,6 @@ fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
     times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 
-
 /// How far a sum may be from that of so many stored values.
 fn rounding(count: usize, sum: f64) -> f64 {
     1e-6 * (1 + count) as f64 + 1e-9 * sum

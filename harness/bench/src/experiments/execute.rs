@@ -9,7 +9,7 @@ use contract::case::Case;
 use contract::failure::{Failure, Result};
 use run::engine::description::is_own;
 use run::engine::layout::{Launcher, Layout, Ranks, RunOptions, node_count};
-use run::engine::report::PhaseReport;
+use run::engine::report::{CLOCKS_S, PhaseReport};
 use run::engine::runner::{Completed, Engine, Programs};
 use std::fs;
 use std::path::Path;
@@ -96,7 +96,7 @@ impl Runner<'_> {
             digest: report.digest.unwrap_or_default(),
             setup: setup.clone(),
         };
-        let why = "its run report has numbers that no run can have, such as a time longer than that of its process";
+        let why = "its run report has numbers that no run can have, such as a phase that takes longer than the run";
         Failure::unless(run.is_possible(), why)?;
         // As of milliseconds for seconds. Ranks within one process run in turn, and the wall time that they report is that of one. Each may have threads, and a limit of cores be a fraction.
         let busy_s = if setup.comm == Comm::Mpi { run.useful_s.max } else { run.useful_s.sum };

@@ -152,7 +152,7 @@ impl Rules {
     fn check(&self) -> Result<(), String> {
         let TimeRules { alpha, rounds_min: fewest, rounds_max, .. } = self.time;
         let TimeRules { effect_min, effect_wanted, budget_s, .. } = &self.time;
-        let is_level = (1e-8..0.5).contains(&alpha);
+        let is_level = (1e-6..0.5).contains(&alpha);
         let least = if is_level { rounds_min(alpha) } else { 0 };
         let few = format!(
             "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
@@ -161,7 +161,7 @@ impl Rules {
         let numbers = [counters, instructions, memory, effect_min, effect_wanted, budget_s];
         let are_ordinary = numbers.into_iter().chain(of.values()).all(|n| (0.0..=1e6).contains(n));
         refuse(&[
-            (!is_level, "alpha must be at least 1e-8 and less than 0.5"),
+            (!is_level, "alpha must be at least 1e-6 and less than 0.5"),
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
             (!are_ordinary, "tolerances, effects and budget_s must be between 0 and 1000000"),
@@ -271,7 +271,7 @@ mod tests {
         let case = "[[case]]\nname = 'a'\nlayers = ['time']\n";
         let wrong = |text: &str| read(&format!("{text}\n{case}")).unwrap_err();
         assert!(wrong("[time]\nrounds_min = 3").contains("rounds_min"));
-        assert!(wrong("[time]\nalpha = 0.0").contains("alpha"));
+        assert!(wrong("[time]\nalpha = 1e-7").contains("alpha"));
         // An effect that none exceeds would make every time unchanged.
         for key in
             ["effect_min = inf", "effect_wanted = nan", "effect_min = -1.0", "budget_s = nan"]

@@ -1,9 +1,9 @@
 //! The two programs of a gate: given as files, or built from revisions of a repository or from its working tree.
 //!
-//! Each revision has two directories of its own: one for its files, and one in the repository's `target/gate` for the results of its
-//! build. Both are kept whole, because a program may need libraries or data beside it, and are used where they were built. The
-//! repository, its index and its working tree stay unchanged. The build command is always run: cargo and make know better than the gate what a build
-//! depends on, and compile nothing twice.
+//! Each revision has two directories of its own: one for its files, and one in the repository's `target/gate` for the results of
+//! its build. Both are kept whole, because a program may need libraries or data beside it, and are used where they were built. The
+//! repository, its index and its working tree stay unchanged. The build command is always run: cargo and make know better than the
+//! gate what a build depends on, and compile nothing twice.
 
 use super::GateOptions;
 use super::measures::{CaseMeasures, Measured, WORKING_TREE};
@@ -98,10 +98,10 @@ impl Subject {
 
 /// Builds and returns the program of a revision, or that of the repository's working tree.
 fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf> {
-    let repository = &fs::canonicalize(repository).map_err(|error| Failure::at(repository, error))?;
+    let repository =
+        &fs::canonicalize(repository).map_err(|error| Failure::at(repository, error))?;
     let place = repository.join("target/gate").join(revision.unwrap_or("working-tree"));
-    let of_repository = || sources().join(repository.strip_prefix("/").unwrap_or(repository));
-    let tree = revision.map_or(repository.to_owned(), |name| of_repository().join(name));
+    let tree = revision.map_or(repository.to_owned(), |name| sources(repository).join(name));
     let mut values = Values::default();
     for (name, path) in [("target", place.join("build")), ("root", tree)] {
         let made = fs::create_dir_all(&path).and_then(|()| fs::canonicalize(&path));
@@ -133,12 +133,14 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     Ok(program)
 }
 
-/// Where the files of revisions are: in no directory of their repository, as cargo also reads the settings of every directory above
+/// Where the files of a repository's revisions are: not in the repository, as cargo also reads the settings of every directory above
 /// (`.cargo/config.toml`), and then those of the working tree would apply to all revisions.
-fn sources() -> PathBuf {
-    let given = env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|at| at.is_absolute());
+fn sources(repository: &Path) -> PathBuf {
+    let given = env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
     let home = || Some(PathBuf::from(env::var_os("HOME")?).join(".cache"));
-    given.or_else(home).unwrap_or_else(env::temp_dir).join("harness-gate")
+    let cache = given.or_else(home).filter(|at| at.is_absolute() && !at.starts_with(repository));
+    let place = cache.unwrap_or_else(env::temp_dir).join("harness-gate");
+    place.join(repository.strip_prefix("/").unwrap_or(repository))
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

@@ -269,8 +269,8 @@ impl Session<'_> {
         })
     }
 
-    /// Plans the run of this name.
-    fn of_run(&mut self, name: &str) -> Result<Planned> {
+    /// Plans the run of this name; appends a failure if no spacing is found for it.
+    fn of_run(&mut self, name: &str) -> Result<Option<Planned>> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
         let base = self.base(&mesh.case, None)?;
@@ -279,10 +279,18 @@ impl Session<'_> {
             None => mesh.spacing_min.unwrap_or(base.spacing_min),
             Some(cells) => {
                 (self.progress)(&format!("{}: looking for the spacing", spec.mesh));
-                self.spacing(&base, n, cells)?
+                match self.spacing(&base, n, cells) {
+                    Ok(spacing) => spacing,
+                    Err(failure) => {
+                        let why =
+                            format!("no spacing is known for {cells:.1e} cells: {}", failure.why);
+                        let setup = spec.setup(base.spacing_min, n);
+                        return self.failed(setup, Failure { why, ..failure }).map(|()| None);
+                    }
+                }
             }
         };
-        self.planned(spec.setup(spacing, n), spec.repeats)
+        self.planned(spec.setup(spacing, n), spec.repeats).map(Some)
     }
 
     /// Plans a run of the study, and writes its case.
@@ -320,15 +328,11 @@ impl Session<'_> {
                 continue;
             }
             match self.of_run(name) {
-                Ok(point) => points.push(point),
-                Err(failure) => {
-                    // Of a mesh without a spacing, a run at any is one of this name.
-                    let (spec, mesh) = (&study.run[name], &study.mesh[&study.run[name].mesh]);
-                    let (spacing, n) = (mesh.spacing_min, mesh.layer_cells_min);
-                    let setup = spec.setup(spacing.unwrap_or_default(), n.unwrap_or_default());
-                    let why = format!("mesh {}: {}", spec.mesh, failure.why);
-                    self.failed(setup, Failure { why, ..failure })?;
-                    return Ok(judge(study, row, &self.lines));
+                Ok(point) => points.extend(point),
+                Err(failure) if failure.is_interrupt() => return Err(failure),
+                Err(Failure { why, .. }) => {
+                    let why = format!("mesh {}: {why}", study.run[name].mesh);
+                    return Ok(unjudged(row, true, why));
                 }
             }
         }

@@ -102,14 +102,16 @@ fn child(tree: &Tree, (octant, handle): Place, digit: u8) -> Place {
     (octant.child(digit), tree.child(handle, digit, octant.level))
 }
 
+/// One more than the level for which a box was sought, and the box.
+type Known = (u8, Option<[[u8; 3]; 2]>);
+
 /// Boxes around those parts of octants that matter.
 struct Boxes<'a> {
     tree: &'a Tree,
     /// Whether all of an octant with some content and level matters, or only parts of it; `None` if nothing does.
     matters: &'a dyn Fn(Handle, u8) -> Option<bool>,
-    /// By the index of a node: one more than the level for which the box was sought, whether there is one, and the box. Equal octants
-    /// seldom have two levels.
-    known: RefCell<Vec<(u8, bool, [[u8; 3]; 2])>>,
+    /// By the index of a node. Equal octants seldom have two levels.
+    known: RefCell<Vec<Known>>,
 }
 
 impl<'a> Boxes<'a> {
@@ -123,9 +125,9 @@ impl<'a> Boxes<'a> {
         if (self.matters)(handle, level)? {
             return Some(Region::WHOLE);
         }
-        let (sought, is_found, known) = self.known.borrow()[handle.index()];
+        let (sought, known) = self.known.borrow()[handle.index()];
         if sought == level + 1 {
-            return is_found.then_some(known);
+            return known;
         }
         let mut found: Option<[[u8; 3]; 2]> = None;
         for digit in 0..8 {
@@ -135,8 +137,7 @@ impl<'a> Boxes<'a> {
             let ends = |a: usize| [from[a].min(low[a]), to[a].max(high[a])];
             found = Some([0, 1].map(|end| [0, 1, 2].map(|a| ends(a)[end])));
         }
-        let known = (level + 1, found.is_some(), found.unwrap_or_default());
-        self.known.borrow_mut()[handle.index()] = known;
+        self.known.borrow_mut()[handle.index()] = (level + 1, found);
         found
     }
 

@@ -13,7 +13,7 @@
 use super::truth::Facets;
 use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
 use contract::lattice::UNITS_PER_EDGE;
-use contract::manifest::Manifest;
+use contract::manifest::{ExtentBox, Manifest};
 use contract::octant::Octant;
 use contract::tree::{Builder, DELETED, Handle, Kind, Tree};
 use contract::word::{self, Side};
@@ -44,8 +44,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     crossing_fine(tree, terms, result);
     none_finer(tree, terms, result);
     let without = tree.kinds(tree.root) & 1 << Side::Crossing as u8 == 0
-        && !terms.boxes.iter().any(|b| b.meets(&Octant::ROOT));
-    let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
+        && !terms.boxes.iter().any(ExtentBox::is_in_root);
+    let uncrossed = || "no leaf is crossing, and no box is in the root".to_owned();
     result.requires(some_leaves(subject.tree_with_deleted()).or_else(|| without.then(uncrossed)));
 }
 

@@ -144,7 +144,7 @@ mod tests {
             );
             count += 1;
         }
-        assert_eq!(count, 10);
+        assert_eq!(count, 11);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, Result, exit_first};
 use report::benchmark::numbers::{Checked, Number, check, included};
 use report::benchmark::report;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -118,8 +118,13 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>> {
         }
         all.extend(read);
     }
-    // The first machine and build keep their names, and the last ones count, whatever file they are in.
-    all.sort_by(|a: &Line, b| a.time_utc.cmp(&b.time_utc));
+    // The first machine and build keep their names, and the last ones count, whatever file their sessions are in.
+    let mut begun: HashMap<String, String> = HashMap::new();
+    for Line { session, time_utc, .. } in &all {
+        let first = begun.entry(session.clone()).or_insert_with(|| time_utc.clone());
+        *first = first.clone().min(time_utc.clone());
+    }
+    all.sort_by_cached_key(|line: &Line| begun[&line.session].clone());
     Ok(all)
 }
 

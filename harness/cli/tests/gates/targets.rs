@@ -64,7 +64,9 @@ fn a_mesh_whose_spacing_is_not_found_fails_by_the_record_too() {
     fixture.program("mesher", "#!/bin/sh\nexit 70\n");
     for command in [TARGETS_COMMAND, SHOW] {
         let outcome = fixture.harness(&format!("{command} --record r.jsonl"));
-        let is_said = outcome.printed.contains("FAILED: run one failed: mesh body: ");
+        let is_said = outcome
+            .printed
+            .contains("FAILED: run one failed: no spacing is known for 1.0e5 cells: ");
         assert!(outcome.code == 1 && is_said, "{}", outcome.printed);
     }
 }
@@ -218,7 +220,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     assert!(nothing.printed.contains("mesher ended with code 70"), "{}", nothing.printed);
 }
 
-/// The record that ends last has them, whatever the names of the files.
+/// The session that began last has them, whatever the names of the files.
 #[test]
 fn the_last_build_and_the_last_network_are_those_of_an_archive() {
     let fixture = scripted();

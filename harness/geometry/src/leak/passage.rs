@@ -20,7 +20,6 @@ use contract::case::Case;
 use contract::failure::Result;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::ExtentBox;
-use contract::octant::Octant;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
 use std::collections::BTreeSet;
@@ -257,9 +256,10 @@ fn described(
         before[..first].iter().copied().chain(inside).chain(after.iter().rev().skip(1).copied());
     let width = 2.0 * unit * clearance;
     let is_met = |b: &&ExtentBox| {
-        b.meets(&Octant::ROOT)
-            && (0..3)
-                .all(|a| (b.min[a] as f64) < at[a] + clearance && at[a] - clearance < b.max[a] as f64)
+        b.is_in_root()
+            && (0..3).all(|a| {
+                (b.min[a] as f64) < at[a] + clearance && at[a] - clearance < b.max[a] as f64
+            })
     };
     let boxes = case.boxes.iter().filter(is_met).map(|b| case.root.edge_of(b.level));
     Passage {
