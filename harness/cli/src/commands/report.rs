@@ -164,6 +164,33 @@ mod tests {
         texts(&at("paper.tex"), &at("report")).map_or(0, |texts| texts.len())
     }
 
+    /// A machine that measures again, while another one does, keeps its name.
+    #[test]
+    fn sessions_are_in_the_order_in_which_they_began_whatever_file_has_them() {
+        let place = tempfile::tempdir().unwrap();
+        let line = |(session, hour): &(&str, u8)| {
+            format!(
+                r#"{{"schema": "octree-bench/1", "session": "{session}", "time_utc": "2026-01-31T{hour:02}:00:00Z", "kind": "left_out", "why": "",
+                "setup": {{"experiment": "strong", "engine": "mesher", "case": "a", "spacing_min": 1.0, "layer_cells_min": 1, "ranks": 1, "comm": "solo",
+                "partitioner": "", "weights": ""}}}}"#
+            )
+            .replace('\n', " ")
+                + "\n"
+        };
+        let record = |name: &str, of: &[(&str, u8)]| {
+            let path = place.path().join(name);
+            fs::write(&path, of.iter().map(line).collect::<String>()).unwrap();
+            path
+        };
+        let records = [
+            record("a", &[("first", 8), ("third", 10), ("third", 13)]),
+            record("b", &[("second", 9), ("second", 12)]),
+        ];
+        let sessions: Vec<String> =
+            read(&records).unwrap().into_iter().map(|line| line.session).collect();
+        assert_eq!(sessions, ["first", "second", "second", "third", "third"]);
+    }
+
     #[test]
     fn included_texts_are_read_but_for_files_of_a_report() {
         assert_eq!(read_of(r"\input{of paper/a}\input{\figures/a}"), 1);
