@@ -206,7 +206,7 @@ impl<'a> Problem<'a> {
         // Without doubt that the run does not fit, its pilots are short.
         let thick = (f64::from(self.rules.layer_cells_min) / 4.0).clamp(1.0, 16.0);
         let doubted = if self.used_rough() > USED_UNDOUBTED * thick { 0.0 } else { rough_at(0) };
-        let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT);
+        let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT * thick);
         let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
         let mut pilots = Vec::new();
         let (mut coarser, mut before) = (None, false);

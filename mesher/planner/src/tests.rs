@@ -169,21 +169,24 @@ fn pilots_of_runs_that_cannot_fit_are_short() {
 /// 1.97e11 cells in layers of 64 were planned as 7.6e9, from pilots whose layers filled the root, because 2 bytes for each did not fit.
 #[test]
 fn pilots_of_thick_layers_are_finer_because_their_cells_take_less() {
-    with_problem(18, |problem| {
-        let finest = |layer_cells_min| {
-            let rules = Rules { layer_cells_min, ..problem.rules.clone() };
-            let mut finest = 0.0;
-            let pilot = &mut |shift| {
-                let amounts = amounts(problem.rough[0], 1.0, shift);
-                finest = amounts.cells;
-                Ok((amounts, false))
-            };
-            Problem { rules: &rules, ..*problem }.plan(pilot).unwrap();
-            finest
+    let finest = |problem: &Problem, layer_cells_min| {
+        let rules = Rules { layer_cells_min, ..problem.rules.clone() };
+        let mut finest = 0.0;
+        let pilot = &mut |shift| {
+            let amounts = amounts(problem.rough[0], 1.0, shift);
+            finest = amounts.cells;
+            Ok((amounts, false))
         };
-        assert!(finest(64) > CELLS_MOMENT, "{}", finest(64));
-        assert_eq!(finest(4) < finest(64), problem.used_rough() > USED_UNDOUBTED);
+        Problem { rules: &rules, ..*problem }.plan(pilot).unwrap();
+        finest
+    };
+    with_problem(18, |problem| {
+        let [thin, thick] = [4, 64].map(|n| finest(problem, n));
+        assert!(thick > CELLS_MOMENT, "{thick}");
+        assert_eq!(thin < thick, problem.used_rough() > USED_UNDOUBTED);
     });
+    let fits = with_problem(13, |problem| [4, 64].map(|n| finest(problem, n)));
+    assert_eq!(fits, [ROUGH / 64.0, ROUGH / 4.0]);
 }
 
 /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
