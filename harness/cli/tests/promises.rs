@@ -269,8 +269,8 @@ fn a_promise_about_nothing_is_not_kept() {
     // The deleted leaves of T0 at the surface are finer.
     npy::write(&fixture.path("right.npy"), &[word::encode(Octant::ROOT, Side::Outside)]).unwrap();
     nothing("balance = 'face'", "all leaves have level 0");
-    fixture
-        .write("simulated.toml", &FOREST.replace("parallel = [\"{launcher}\", ", "simulated = ["));
+    let simulated = "simulated = [\"env\", \"RANKS={ranks}\", ";
+    fixture.write("simulated.toml", &FOREST.replace("parallel = [\"{launcher}\", ", simulated));
     copying(&fixture, "unitcube");
     let verified = fixture.harness("verify case.toml --engine simulated.toml");
     let is_named = verified.printed.contains("has no command `parallel`");

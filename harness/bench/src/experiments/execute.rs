@@ -207,8 +207,7 @@ mod tests {
     /// The run of a shell script in a directory with the case file `case.toml`; `more` continues the table [run].
     fn run_in(at: &Path, script: &str, more: &str, comm: Comm, warm: bool) -> Result<Run, String> {
         std::fs::write(at.join("engine.sh"), script).unwrap();
-        let words =
-            "serial = ['sh', '{program}', '{case}']\nsimulated = ['sh', '{program}', '{case}']\n";
+        let words = "serial = ['sh', '{program}', '{case}']\nsimulated = ['env', 'N={ranks}', 'sh', '{program}', '{case}']\n";
         let text = format!(
             "about = 'x'\nprogram = '{{here}}/engine.sh'\n[run]\n{words}out = ['{{out}}']\n{more}"
         );
@@ -250,7 +249,7 @@ mod tests {
 
     #[test]
     fn useful_time_is_cpu_time_outside_calls() {
-        let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 0.009, "peak_rss_bytes": [70, 70],
+        let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 0.009, "peak_rss_bytes": [70000000, 70000000],
             "counters": {"leaves": [30, 50]}, "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [0.02, 0.01],
             "time_comm_wall_s": [1.0, 1.0], "time_comm_cpu_s": [0.005, 0.011], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
         let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -261,7 +260,7 @@ mod tests {
         assert_eq!((run.useful_s.sum, run.useful_s.max), (0.015, 0.015));
         assert_eq!((run.phases[0].wall_s.max, run.phases[0].message_bytes.sum), (4.5, 24.0));
         // A simulated rank reports its part of the one process.
-        assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
+        assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (14e7, 50.0));
     }
 
     /// Those of rank 0 alone, or of all ranks together, say nothing of each.
@@ -311,11 +310,15 @@ mod tests {
         // So is that of a program whose clock shows nothing.
         for phases in ["", r#", "phases": [{"name": "all", "time_cpu_s": [0.0]}]"#] {
             let report = format!(
-                r#"{{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9{phases}}}"#
+                r#"{{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9000000{phases}}}"#
             );
             let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
-            assert_eq!((run.useful_s, run.peak_rss_bytes.sum), (Spread::default(), 9.0));
+            assert_eq!((run.useful_s, run.peak_rss_bytes.sum), (Spread::default(), 9e6));
         }
+        // As in another unit, of a run that is long enough to be sampled.
+        let script = r#"echo '{"cells": 8, "digest": "00", "peak_rss_bytes": 90}' > $2; sleep 0.1"#;
+        let why = scripted(script, REPORTS, Comm::Solo).unwrap_err();
+        assert!(why.contains("reports a peak memory of 90 bytes, and took "), "{why}");
     }
 
     #[test]
@@ -347,10 +350,10 @@ mod tests {
 
     #[test]
     fn reported_time_and_memory_take_precedence() {
-        let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 0.0075, "peak_rss_bytes": [3, 4],
+        let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 0.0075, "peak_rss_bytes": [3000000, 4000000],
             "phases": [{"name": "all", "time_cpu_s": [0.02, 0.01]}]}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
-        assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (0.0075, 7.0));
+        assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (0.0075, 7e6));
         assert_eq!((run.useful_s.by_rank, run.phases[0].useful_s.max), (vec![0.02, 0.01], 0.02));
     }
 

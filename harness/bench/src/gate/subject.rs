@@ -110,6 +110,10 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     }
     let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
+    if program.starts_with(&values["target"]) {
+        // That of an earlier build must not be taken for one of this build.
+        let _ = fs::remove_file(&program);
+    }
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
     let mut label = "the working tree";
     if let Some(revision) = revision {

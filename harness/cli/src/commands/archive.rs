@@ -65,6 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let text = lines.iter().map(|line| serde_json::to_string(line).expect("plain data") + "\n");
     let put = |name: &str, text: String| put(&place.join(name), &text);
     put(RECORD, text.collect())?;
+    // What lies in the report may be of an earlier record.
+    report::benchmark::report(place, &lines)?;
     put(EXPECTED, pretty(&expected))?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;

@@ -22,7 +22,7 @@ done
 from="$here/$tree"
 [ -z "$out" ] || cp -r "$from" "$out"
 ranks="$FAKE_RANKS"
-[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "ranks": %s, "time_wall_s": 0.005, "peak_rss_bytes": [9]}' \
+[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "ranks": %s, "time_wall_s": 0.005, "peak_rss_bytes": [9000000]}' \
     "$(cat "$here/$tree.digest")" "${ranks:-1}" > "$json"
 "#;
 

@@ -147,9 +147,9 @@ impl Description {
         let mut description: Self = toml::from_str(text).map_err(|e| explain(text, &e, page))?;
         description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
-        if let Some(first) = templates.serial.first().cloned() {
-            templates.check_placeholders()?;
-            templates.check_promises(&description.promises)?;
+        // Behind variables of the environment.
+        let is_program = |word: &&String| *word != "env" && !word.contains('=');
+        if let Some(first) = templates.serial.iter().find(is_program).cloned() {
             if description.program.is_empty() {
                 // So that another program can be run.
                 let Templates { serial, parallel, simulated, .. } = templates;
@@ -157,6 +157,8 @@ impl Description {
                 words.filter(|word| **word == first).for_each(|word| *word = "{program}".into());
                 description.program = first;
             }
+            templates.check_placeholders()?;
+            templates.check_promises(&description.promises)?;
         }
         Ok(description)
     }
@@ -273,6 +275,18 @@ mod tests {
         assert!(why(&format!("{LEAST}status = ['{{out}}']\n")).contains("`status`"));
         assert!(why(&format!("{LEAST}outt = []\n")).contains("outt"));
         assert!(why(&format!("{LEAST}serve = ['{{case}}']\n")).contains("`serve`"));
+        let lacking = [
+            ("parallel = ['{launcher}', 'm', '{case}']", "`parallel` has no {program}"),
+            ("parallel = ['mpirun', '{program}', '{case}']", "`parallel` has no {ranks}"),
+            ("simulated = ['{program}', '{case}']", "`simulated` has no {ranks}"),
+            ("partitioner = ['--metis']", "`partitioner` has no {partitioner}"),
+        ];
+        for (line, expected) in lacking {
+            let why = why(&format!("{LEAST}{line}\n"));
+            assert!(why.contains(expected), "{why}");
+        }
+        let file = "[run]\nserial = ['env', 'A=1', 'm', '{case}', '{out}']\n";
+        assert_eq!(Description::parse(file).unwrap().program, "m");
     }
 
     #[test]
@@ -285,12 +299,12 @@ mod tests {
         for of in ["ranks", "partitioner"] {
             assert!(with(of, "").unwrap_err().why.contains("with which to vary it"), "{of}");
         }
-        let parallel =
-            "parallel = ['{launcher}', '{case}', '{out}']\npartitioner = ['{partitioner}']\n";
+        let ranks = "parallel = ['{launcher}', 'm', '{case}', '{out}']\n";
+        let parallel = &format!("{ranks}partitioner = ['{{partitioner}}']\n");
         let alone = with("partitioner", parallel).unwrap_err().why;
         assert!(alone.contains("add \"ranks\""), "{alone}");
         assert!(with("ranks', 'partitioner", parallel).is_ok());
-        assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
+        assert!(with("ranks", ranks).is_ok());
         let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err().why;
         assert!(empty.contains("[promises] is empty"), "{empty}");
     }

@@ -256,6 +256,12 @@ impl Engine {
             let ran = finished.time_wall_s;
             return Err(format!("reports a wall time of {stated} s, and ran for {ran:.3} s"));
         }
+        // As of KiB for bytes.
+        let (stated, least) = (report.peak_rss_bytes_total(), 100 * ranks as u64);
+        let is_more = |took: &u64| (1..took / least).contains(&stated);
+        if let Some(took) = finished.peak_rss_bytes.filter(is_more) {
+            return Err(format!("reports a peak memory of {stated} bytes, and took {took}"));
+        }
         // The balance of ranks is that of this counter.
         let leaves = report.counters.get("leaves").filter(|of| of.len() == ranks);
         let sum = leaves.map_or(report.cells, |of| of.iter().sum());

@@ -103,7 +103,7 @@ impl Templates {
         Failure::unless(is_compared || !on_partitioner, why)
     }
 
-    /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
+    /// Refuses placeholders that have no value in the template that contains them, and templates without those that they are for.
     pub(super) fn check_placeholders(&self) -> Result<()> {
         // A command that contains {out} needs no template that appends it.
         let needs_out = self.out.is_empty();
@@ -114,9 +114,11 @@ impl Templates {
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
             check_known(key, &words.cloned().collect::<Vec<_>>(), &own)?;
             let has = |text: &str| template.iter().any(|word| word.contains(text));
-            let is_served = key == "parallel" && !self.serve.is_empty();
-            let why = "`serve` needs the word {program} in `parallel`";
-            Failure::unless(!is_served || has("{program}"), why)?;
+            let why = format!("`{key}` has no {{program}}, in place of the program's name");
+            Failure::unless(has("{program}"), why)?;
+            let is_on_ranks = has("{ranks}") || has(LAUNCHER);
+            let why = format!("`{key}` has no {{ranks}}, the number of ranks to start");
+            Failure::unless(key == "serial" || is_on_ranks, why)?;
             let why = format!(
                 "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
                  key `out`, as in out = [\"--out\", \"{{out}}\"]"
@@ -127,7 +129,12 @@ impl Templates {
             Failure::unless(is_given, why)?;
         }
         check_known("serve", &self.serve, &[])?;
-        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of, &["case", key]))
+        self.appended().into_iter().try_for_each(|(key, of)| {
+            let is_switch = ["ungraded", "time_alone"].contains(&key) || of.is_empty();
+            let why = format!("`{key}` has no {{{key}}}, so that it would choose nothing");
+            Failure::unless(is_switch || of.concat().contains(&format!("{{{key}}}")), why)?;
+            check_known(key, of, &["case", key])
+        })
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
