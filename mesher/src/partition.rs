@@ -29,8 +29,8 @@ pub enum Partitioner {
     /// Intervals of the Morton curve with equal weight
     #[default]
     Morton,
-    /// As in the paper: METIS on every rank, for the leaves of a base mesh of fixed depth (--level-base, 7 unless given), without those on
-    /// the side that is not kept, each with weight 1; or an error
+    /// As in the paper: METIS on every rank, for the leaves of a base mesh of fixed depth (--level-base, 7 unless given; less than the deepest
+    /// level), without those on the side that is not kept, each with weight 1; or an error
     Paper,
 }
 

@@ -145,12 +145,10 @@ fn special(path: &Path) -> io::Result<Option<File>> {
 }
 
 /// The file that symbolic links lead to, which may not exist yet.
-fn target(path: &Path) -> PathBuf {
-    let mut path = path.to_owned();
-    while let Ok(next) = fs::read_link(&path) {
-        path = folder_of(&path).join(next);
-    }
-    path
+pub(crate) fn target(path: &Path) -> PathBuf {
+    let next = |at: &PathBuf| Some(folder_of(at).join(fs::read_link(at).ok()?));
+    // Linux follows 40 links at most.
+    std::iter::successors(Some(path.to_owned()), next).take(41).last().unwrap_or_default()
 }
 
 /// The standard output or error, if that is the file: opening `/dev/stdout` again would overwrite what has been printed.

@@ -6,6 +6,7 @@
 //!
 //! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
 
+use crate::outputs::target;
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
@@ -125,7 +126,7 @@ pub fn name_output(path: &Path) -> io::Result<()> {
     if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return Ok(());
     }
-    let absolute = std::path::absolute(path)?;
+    let absolute = std::path::absolute(target(path))?;
     // What does not exist yet may be in a directory that has several names.
     let place = absolute.ancestors().find_map(|above| {
         let mut place = fs::canonicalize(above).ok()?;
@@ -227,22 +228,16 @@ mod tests {
         let at = |name: &str| place.path().join(name);
         fs::create_dir(at("mesh")).unwrap();
         fs::create_dir(at("other")).unwrap();
-        std::os::unix::fs::symlink(at("mesh"), at("link")).unwrap();
+        for (from, to) in [("link", "mesh"), ("dangling", "mesh/new"), ("loop", "loop")] {
+            std::os::unix::fs::symlink(at(to), at(from)).unwrap();
+        }
         name_output(&at("mesh")).unwrap();
-        name_output(&at("run.json")).unwrap();
-        for clash in [
-            "mesh",
-            "link",
-            "mesh/mesh.json",
-            "link/mesh.json",
-            "run.json",
-            "mesh/../run.json",
-            ".",
-        ] {
+        name_output(&at("r")).unwrap();
+        for clash in ["mesh", "link", "mesh/m", "link/m", "dangling", "r", "mesh/../r", "."] {
             let error = name_output(&at(clash)).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::InvalidInput, "{clash}: {error}");
         }
-        for free in ["other", "mesh.json", "meshes", "run.json2", "/dev/null", "/dev/null"] {
+        for free in ["other", "loop", "mesh.json", "meshes", "r2", "/dev/null", "/dev/null"] {
             name_output(&at(free)).unwrap();
         }
         fs::write(at("body.stl"), "solid").unwrap();

@@ -119,6 +119,7 @@ pub fn mesh(case: &Case, is_forced: bool, job: &mut Job) -> Result<Report, Error
         if is_forced {
             return Ok(());
         }
+        job.record.report_status("plan");
         let run = &mut |shift| pilot(quantised, shift, job);
         uncounted(job.comm, || Problem::new(quantised, job).check(run))
     })
@@ -150,11 +151,13 @@ fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<(Amounts, boo
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     let mut result = run(rules.clone(), job.options.division);
-    // METIS may have too few base leaves for the ranks, and a seed may lie in a coarser cell that crosses.
-    if result.is_err() && shift > 0 && job.options.division != Division::default() {
+    // METIS may have too few base leaves for the ranks, if they are coarser, and a seed may lie in a coarser cell that crosses.
+    let is_coarser = |base| rules.level_deepest() <= base;
+    if result.is_err() && shift > 0 && job.options.division.level_base.is_none_or(is_coarser) {
         result = run(rules.clone(), Division::default());
     }
-    let is_unseeded = result.is_err() && shift > 0 && !rules.seeds.is_empty();
+    let may_cross = !rules.seeds.is_empty() && rules.seeds.iter().all(|seed| seed.is_in_root());
+    let is_unseeded = result.is_err() && shift > 0 && may_cross;
     if is_unseeded {
         result = run(Rules { seeds: Vec::new(), ..rules }, Division::default());
     }

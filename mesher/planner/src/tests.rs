@@ -245,7 +245,9 @@ fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
     // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
     let [without, with] = [0.53, 0.7].map(|x| run(x, 3).unwrap().1);
     assert!(without && !with);
-    assert_eq!(run(0.5, 0).unwrap_err().exit_code, 2);
+    // Also a pilot run of a case that is refused.
+    let code = |(x, shift)| run(x, shift).unwrap_err().exit_code;
+    assert_eq!([(0.5, 0), (900.0, 3)].map(code), [2, 2]);
 }
 
 #[test]
