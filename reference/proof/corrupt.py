@@ -315,6 +315,10 @@ def unchanged(m, b): pass
 def two_parts(m, b): half(m); half(b)
 def interleaved_parts(m, b): m.parts = [m.words[0::2], m.words[1::2], []]; b.parts = [b.words[1::3], b.words[0::3], b.words[2::3]]
 
+def written_otherwise(m, b):
+    m.manifest["root"] = dict(reversed(m.manifest["root"].items()))
+    del m.manifest["geometry"]
+
 
 REJECTED = [drop, drop_first, drop_last, duplicate, swap, level_up, level_down, level_31, misalign, other_side, no_side, not_crossing,
             crossing_in_free_space, coarsen_at_finer, coarsen_in_layer, coarsen_at_surface, coarsen_base_leaf, restore_deleted,
@@ -323,7 +327,7 @@ REJECTED = [drop, drop_first, drop_last, duplicate, swap, level_up, level_down, 
             base_duplicate, base_side, base_coarse_crossing, all_sides, base_hole_in_wall, thicker_layers, keep_everything, keep_other,
             crossing_dropped, enclosed_otherwise, enclosed_not_deleted, seed_in_wall, seed_elsewhere, seed_outside]
 COUNTS = [count_leaves, count_part, count_levels, count_sides, count_base]
-ACCEPTED = [unchanged, two_parts, interleaved_parts]
+ACCEPTED = [unchanged, two_parts, interleaved_parts, written_otherwise]
 CASES = ["pipe-small", "cube_seeds_on_faces-small", "cube-small", "box_in_box-small", "boxes_overlapping_keep-small", "fighter-small",
          "duct_layers-small", "sphere"]
 

@@ -108,9 +108,19 @@ let inputs (file, m) =
     delete_enclosed = (match field file "enclosed" m with
       | None | Some (Text "delete") -> true | Some (Text "keep") -> false | _ -> unusable "%s: enclosed" file) }
 
-(* Both directories are of one case. *)
+(* Values that are equal however they are written. *)
+let rec plain = function
+  | Object fields -> Object (List.sort compare (List.map (fun (k, v) -> (k, plain v)) fields))
+  | List l -> List (List.map plain l)
+  | Number s -> Number (match float_of_string_opt s with Some x -> Printf.sprintf "%h" x | None -> s)
+  | v -> v
+
+(* Both directories are of one case. Another program's mesh need not state its geometry. *)
 let same_case (f, m) (g, b) =
-  List.iter (fun key -> if get f key m <> get g key b then unusable "%s and %s differ in %s" f g key) ["root"; "boxes"; "geometry"];
+  List.iter (fun key -> if plain (get f key m) <> plain (get g key b) then unusable "%s and %s differ in %s" f g key) ["root"; "boxes"];
+  (match field f "geometry" m, field g "geometry" b with
+    | Some v, Some w when plain v <> plain w -> unusable "%s and %s differ in geometry" f g
+    | _ -> ());
   if inputs (f, m) <> inputs (g, b) then unusable "%s and %s differ in the surface level, layers, keep, seeds or enclosed" f g
 
 (* The crossing leaves of T0, which are those that were deleted after gradation unless gradation has split some (Offer). *)
