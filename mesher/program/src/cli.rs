@@ -98,7 +98,7 @@ impl Args {
 enum Files {
     /// Leaf words: a NumPy array per rank, 8 bytes per cell
     Words,
-    /// The tree with sides, for VTK and ParaView: mesh.vtkhdf, a hyper-tree grid of 0.01 to 0.09 bytes per cell
+    /// The tree with sides, for VTK and ParaView: mesh.vtkhdf, a hyper-tree grid of about 0.05 bytes per cell
     Htg,
 }
 
