@@ -13,9 +13,9 @@ mod unfinished;
 mod uses;
 
 pub use interrupt::{Heap, OUT_OF_MEMORY};
-pub use outputs::{Claim, Draft, check_writable, folder_of, write_atomically};
+pub use outputs::{Claim, Draft, check_writable, write_atomically};
 pub use uses::{
-    append_log, clash, name_output, open, read, read_log, read_text, register_input,
+    append_log, clash, folder_of, name_output, open, read, read_log, read_text, register_input,
     register_output,
 };
 

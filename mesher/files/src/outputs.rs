@@ -7,7 +7,7 @@
 //! - a run removes files only in the directory that it opened, and only under the names that it gave when it claimed.
 
 use crate::unfinished::{Output, Unfinished, locked, open_file, rename_to_new};
-use crate::uses::register_output;
+use crate::uses::{folder_of, register_output, target};
 use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, renameat, unlinkat};
 use rustix::io::Errno;
 use rustix::stdio::{stderr, stdout};
@@ -19,7 +19,7 @@ use std::mem::MaybeUninit;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A file that is being written, removed if it is dropped before [`publish`](Self::publish).
 #[derive(Debug)]
@@ -144,13 +144,6 @@ fn special(path: &Path) -> io::Result<Option<File>> {
     }
 }
 
-/// The file that symbolic links lead to, which may not exist yet.
-pub(crate) fn target(path: &Path) -> PathBuf {
-    let next = |at: &PathBuf| Some(folder_of(at).join(fs::read_link(at).ok()?));
-    // Linux follows 40 links at most.
-    std::iter::successors(Some(path.to_owned()), next).take(41).last().unwrap_or_default()
-}
-
 /// The standard output or error, if that is the file: opening `/dev/stdout` again would overwrite what has been printed.
 fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
     [stdout(), stderr()].into_iter().find_map(|stream| {
@@ -158,11 +151,6 @@ fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
         let is_same = (open.st_dev, open.st_ino) == (file.dev(), file.ino());
         is_same.then(|| stream.try_clone_to_owned().ok())?
     })
-}
-
-/// The directory that has a file, which `.` is for a plain name.
-pub fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// A directory that this run alone writes to. All its files are removed if this is dropped before [`keep`](Self::keep), and the

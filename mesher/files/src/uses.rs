@@ -6,7 +6,6 @@
 //!
 //! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
 
-use crate::outputs::target;
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
@@ -142,6 +141,18 @@ pub fn name_output(path: &Path) -> io::Result<()> {
     }
     uses.outputs.push(place);
     Ok(())
+}
+
+/// The file that symbolic links lead to, which may not exist yet.
+pub(crate) fn target(path: &Path) -> PathBuf {
+    let next = |at: &PathBuf| Some(folder_of(at).join(fs::read_link(at).ok()?));
+    // Linux follows 40 links at most.
+    std::iter::successors(Some(path.to_owned()), next).take(41).last().unwrap_or_default()
+}
+
+/// The directory that has a file, which `.` is for a plain name.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Forgets all files: another run begins.

@@ -2,7 +2,7 @@
 //!
 //! First the cells are estimated roughly, from the areas of facets and the volumes of boxes. A run whose memory is far from every
 //! [limit](Tightest) is made without a plan. Otherwise pilot runs (`pilot`) of the same case at ever finer spacings are made, at least
-//! two, as long as they have at most a 64th of the cells, and the last two are extrapolated. A case with few cells is its own pilot.
+//! two, as long as they have at most a 64th of the cells or take a moment, and the last two are extrapolated. A case with few cells is its own pilot.
 //!
 //! The memory of a rank is what it has resident after the pilots plus the growth of its sets. Nothing here is
 //! counted as communication of the mesher. The mesher knows nothing of its planner: [`mesh`] asks before it lets it run.
@@ -27,7 +27,7 @@ use mesher::input::quantise::Quantised;
 use mesher::output::leaves;
 use mesher::output::report::{Report, grouped};
 use mesher::output::stream::total;
-use mesher::partition::{Division, area};
+use mesher::partition::{Division, PAPER_DEPTH, area};
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
 use pilot::{Amounts, Pilot, boxed_in};
@@ -83,7 +83,7 @@ const BYTES_ROUGH: f64 = 2.0;
 const USED_UNDOUBTED: f64 = 8.0;
 /// A pilot run has at most this fraction of the cells, so that all of them take about 2 % of the time.
 const PART_OF_CELLS: f64 = 64.0;
-/// Cells of a pilot run that takes a moment, a fraction of a second.
+/// Cells of a pilot run that takes a moment, a fraction of a second. Of layers thicker than four cells up to 16 times as many take no longer.
 const CELLS_MOMENT: f64 = 8.4e6;
 /// Bytes per cell of the tree's file with layers of at least four cells: the surface takes most of them, and thinner layers have fewer cells
 /// for it.
@@ -150,16 +150,20 @@ fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<(Amounts, boo
         Ok(pilot::amounts(&mesh, total(&counts), job, &quantised.rules.boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
-    let mut result = run(rules.clone(), job.options.division);
-    // METIS may have too few base leaves for the ranks, if they are coarser, and a seed may lie in a coarser cell that crosses.
-    let is_coarser = |base| rules.level_deepest() <= base;
-    if result.is_err() && shift > 0 && job.options.division.level_base.is_none_or(is_coarser) {
-        result = run(rules.clone(), Division::default());
+    let own = job.options.division;
+    let mut result = run(rules.clone(), own);
+    // METIS may have too few base leaves for the ranks where those of the pilot are coarser.
+    let shallowest = rules.boxes.iter().map(|b| b.level).fold(rules.level_surface, Level::min);
+    let is_coarser = shift > 0 && shallowest < own.level_base.unwrap_or(PAPER_DEPTH);
+    let other = if is_coarser { Division::default() } else { own };
+    if result.is_err() && other != own {
+        result = run(rules.clone(), other);
     }
+    // A seed may lie in a coarser cell that crosses.
     let may_cross = !rules.seeds.is_empty() && rules.seeds.iter().all(|seed| seed.is_in_root());
     let is_unseeded = result.is_err() && shift > 0 && may_cross;
     if is_unseeded {
-        result = run(Rules { seeds: Vec::new(), ..rules }, Division::default());
+        result = run(Rules { seeds: Vec::new(), ..rules }, other);
     }
     result.map(|amounts| (amounts, is_unseeded))
 }

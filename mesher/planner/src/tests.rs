@@ -5,6 +5,7 @@ use super::*;
 use cases::{case, options, rules as plain_rules};
 use mesher::input::lattice::{Keep, Root};
 use mesher::output::write::Output;
+use mesher::partition::Partitioner;
 use ranks::{Solo, sim};
 
 const ROUGH: f64 = 268_435_456.0;
@@ -248,6 +249,28 @@ fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
     // Also a pilot run of a case that is refused.
     let code = |(x, shift)| run(x, shift).unwrap_err().exit_code;
     assert_eq!([(0.5, 0), (900.0, 3)].map(code), [2, 2]);
+}
+
+/// A pilot whose base mesh is that of the run is refused as the run is; one whose base mesh is coarser is divided in another way.
+#[test]
+fn a_partition_that_cannot_be_made_is_not_planned() {
+    let code = |level_base, shift| {
+        let on_rank = |comm: &dyn Comm| {
+            let partitioner = Partitioner::Paper;
+            let division =
+                Division { partitioner, level_base: Some(level_base), ..Division::default() };
+            let (options, mut record) = (Options { division, ..options() }, Recorder::default());
+            let job = &mut Job::new(&options, comm, &mut record);
+            let case = Case { boxes: Vec::new(), ..case() };
+            pilot(&mesher::quantised(&case, job)?, shift, job)
+        };
+        sim::run(9, 7, |comm| on_rank(comm).map_or_else(|why| why.exit_code, |_| 0)).remove(0)
+    };
+    // The surface is at level 9.
+    assert_eq!(
+        [(1, 0), (1, 3), (7, 0), (7, 3), (7, 6)].map(|(l, shift)| code(l, shift)),
+        [2, 2, 0, 0, 0]
+    );
 }
 
 #[test]
