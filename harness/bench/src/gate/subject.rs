@@ -110,8 +110,8 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     }
     let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
-    if program.starts_with(&values["target"]) {
-        // That of an earlier build must not be taken for one of this build.
+    if revision.is_none() && program.starts_with(&values["target"]) {
+        // The files have changed: an earlier program must not be taken for theirs.
         let _ = fs::remove_file(&program);
     }
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
@@ -132,8 +132,8 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
         Failure { why, ..failure.into() }
     })?;
-    let why = format!("the build succeeded, but {} is missing", program.display());
-    Failure::unless(program.is_file(), format!("{label}: {why}: check [build] program"))?;
+    let why = format!("the build succeeded, but did not make {} anew", program.display());
+    Failure::unless(program.is_file(), format!("{label}: {why}: check [build]"))?;
     Ok(program)
 }
 

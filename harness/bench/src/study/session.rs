@@ -100,13 +100,6 @@ pub fn measure(
 ) -> Result<Outcome> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir()?;
     let (launcher, limit) = (&options.launcher, options.timeout);
-    let starts_own = |name: &String| {
-        let words = programs.named(name).description.run.parallel.concat();
-        !words.is_empty() && !words.contains("{launcher}")
-    };
-    let is_default = *launcher == Launcher::mpirun(Path::new("mpirun"));
-    let why = "an engine file has no {launcher} in `parallel`, where --launcher stands";
-    Failure::unless(is_default || !study.engines().iter().any(starts_own), why)?;
     let mut session = Session {
         study,
         options,

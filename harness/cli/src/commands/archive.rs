@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let place = staging.path();
     for name in list(report)? {
         let (from, to) = (report.join(&name), place.join(&name));
-        if !records.contains(&from) {
+        if !records.contains(&from) && !name.starts_with("figures/") {
             to.parent().map_or(Ok(()), fs::create_dir_all)?;
             copy(&from, &to)?;
         }
@@ -65,8 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<u8> {
     let text = lines.iter().map(|line| serde_json::to_string(line).expect("plain data") + "\n");
     let put = |name: &str, text: String| put(&place.join(name), &text);
     put(RECORD, text.collect())?;
-    // What lies in the report may be of an earlier record.
-    report::benchmark::report(place, &lines)?;
+    // Those in the report may be of an earlier record.
+    report::benchmark::report(place, &lines)?.notes.iter().for_each(|note| println!("{note}"));
     put(EXPECTED, pretty(&expected))?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;

@@ -147,10 +147,12 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let nameless = fixture.harness(&archive.replace("--title T", "--title="));
     assert!(nameless.code == 2 && nameless.printed.contains("--title"), "{}", nameless.printed);
     fixture.write("out/numbers.tex", "of an earlier record");
+    fixture.write("out/figures/earlier.svg", "");
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     let numbers = fs::read_to_string(fixture.path("a/numbers.tex")).unwrap();
     assert!(!numbers.contains("of an earlier record"), "{numbers}");
+    assert!(!fixture.path("a/figures/earlier.svg").exists());
     assert!(made.printed.contains(" 3 values to be met"), "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
     // Another case than that of the runs.
@@ -459,13 +461,6 @@ fn missing_programs_and_invalid_input_have_different_exit_codes() {
     ));
     assert_eq!(outcome.code, 3, "{}", outcome.printed);
     assert!(outcome.printed.contains("left out: the launcher is missing"), "{}", outcome.printed);
-    let own = "[run]\nserial = ['true', '{case}', '{out}']\nparallel = ['mpirun', '-n', '{ranks}', 'true', '{case}', '{out}']\n";
-    fixture.write("own.toml", own);
-    fixture.write("series.toml", "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\n");
-    let bench = "bench series.toml --engine own.toml --launcher srun/{ranks}";
-    let ignored = fixture.harness(bench);
-    let is_refused = ignored.printed.contains("has no {launcher} in `parallel`");
-    assert_eq!((ignored.code, is_refused), (2, true), "{}", ignored.printed);
     let excluded =
         fixture.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
     assert_eq!(excluded.code, 0, "{}", excluded.printed);

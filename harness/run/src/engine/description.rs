@@ -5,7 +5,7 @@
 //! unknown placeholders are errors when the file is read.
 
 use super::paths::Paths;
-use super::templates::{Templates, Values};
+use super::templates::{LAUNCHER, Templates, Values, check_known};
 use check::promises::{Independence, Promises, Touching};
 use contract::case::{Case, explain};
 use contract::failure::{Failure, Result};
@@ -73,6 +73,13 @@ pub const EQUAL_RANKS: &str = "equal meshes on any number of ranks";
 
 /// What an engine lacks that is not deterministic.
 pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
+
+/// The word of a command that names its program, which may follow variables of the environment: `env THREADS=4 my-mesher`.
+fn named_program(words: &[String]) -> Option<&String> {
+    let mut rest = words.iter().skip_while(|word| *word == "env" || word.contains('='));
+    let is_env = words.first().is_some_and(|first| first == "env");
+    rest.next().filter(|word| is_env && !word.starts_with('-')).or(words.first())
+}
 
 /// Features of a case file that an engine supports.
 #[derive(Clone, Debug, Deserialize)]
@@ -147,9 +154,8 @@ impl Description {
         let mut description: Self = toml::from_str(text).map_err(|e| explain(text, &e, page))?;
         description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
-        // Behind variables of the environment.
-        let is_program = |word: &&String| *word != "env" && !word.contains('=');
-        if let Some(first) = templates.serial.iter().find(is_program).cloned() {
+        if let Some(first) = named_program(&templates.serial).cloned() {
+            check_known("program", &[first.clone(), description.program.clone()], &[])?;
             if description.program.is_empty() {
                 // So that another program can be run.
                 let Templates { serial, parallel, simulated, .. } = templates;
@@ -203,6 +209,7 @@ impl Description {
         let (promises, takes) = (&self.promises, &self.takes);
         let promised = |has: bool| has || promises.definition;
         let parallel = !self.run.parallel.is_empty();
+        let is_launched = !parallel || self.run.parallel.concat().contains(LAUNCHER);
         let of_ranks = promises.is_independent_of(Independence::Ranks);
         let features = [
             (promised(promises.complete), "meshes without holes"),
@@ -216,6 +223,7 @@ impl Description {
             (takes.seeds, "seeds"),
             (promises.is_deterministic(), EQUAL_RUNS),
             (parallel, "MPI"),
+            (is_launched, "a choice of the launcher"),
             (!parallel || of_ranks, EQUAL_RANKS),
         ];
         let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
@@ -276,7 +284,6 @@ mod tests {
         assert!(why(&format!("{LEAST}outt = []\n")).contains("outt"));
         assert!(why(&format!("{LEAST}serve = ['{{case}}']\n")).contains("`serve`"));
         let lacking = [
-            ("parallel = ['{launcher}', 'm', '{case}']", "`parallel` has no {program}"),
             ("parallel = ['mpirun', '{program}', '{case}']", "`parallel` has no {ranks}"),
             ("simulated = ['{program}', '{case}']", "`simulated` has no {ranks}"),
             ("partitioner = ['--metis']", "`partitioner` has no {partitioner}"),
@@ -285,8 +292,22 @@ mod tests {
             let why = why(&format!("{LEAST}{line}\n"));
             assert!(why.contains(expected), "{why}");
         }
-        let file = "[run]\nserial = ['env', 'A=1', 'm', '{case}', '{out}']\n";
-        assert_eq!(Description::parse(file).unwrap().program, "m");
+        let first = |words: &str| Description::parse(&LEAST_FILE.replace("'m'", words));
+        let program = |words| first(words).unwrap().program;
+        let words = ["'env', 'A=1', 'm'", "'env', '-i', 'm'", "'a=1/m'", "'env', 'm'"];
+        assert_eq!(words.map(program), ["m", "env", "a=1/m", "m"]);
+        assert!(first("'{hree}/m'").unwrap_err().why.contains("unknown placeholder {hree}"));
+    }
+
+    #[test]
+    fn a_program_that_no_command_names_cannot_be_replaced() {
+        let two = "parallel = ['mpirun', '-n', '{ranks}', 'of-ranks', '{case}', '{out}']\n";
+        let run = |more| Description::parse(&format!("{LEAST_FILE}{more}")).unwrap().run;
+        assert!(run("").check_other_program().is_ok());
+        let of_ranks = Description::parse(&format!("{LEAST_FILE}{two}")).unwrap().lacks();
+        assert!(of_ranks.contains(&"a choice of the launcher".to_owned()), "{of_ranks:?}");
+        let why = run(two).check_other_program().unwrap_err().why;
+        assert!(why.contains("has no {program}"), "{why}");
     }
 
     #[test]

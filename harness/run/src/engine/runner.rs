@@ -16,10 +16,10 @@ use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
 use contract::plain::PlainCase;
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::{self, Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
-use std::{fs, io};
 
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
@@ -52,9 +52,9 @@ impl Engine {
     /// One sentence, if the engine file is missing or wrong, or if the command writes one of the engine's files.
     pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, Refusal> {
         let description = Description::find(name, paths)?;
-        let why = "its engine file has no command `serial` in [run], as in serial = [\"my-mesher\", \"{case}\", \"{out}\"]";
-        let why = format_args!("{name} cannot be run: {why}");
+        let why = format!("{name} cannot be run: its engine file has no command `serial` in [run]");
         Refusal::unless(!description.run.serial.is_empty(), why)?;
+        given.map_or(Ok(()), |_| description.run.check_other_program())?;
         let places = description.places(paths);
         let program = match given {
             // A name without a slash would be searched for on the PATH. A link may lead to a program that behaves by its own name.
@@ -76,8 +76,9 @@ impl Engine {
     /// The same engine with another program: another revision of it.
     ///
     /// # Errors
-    /// If the command writes that program.
-    pub fn with_program(&self, program: PathBuf) -> io::Result<Self> {
+    /// If a command has no word for the program, or the command writes that program.
+    pub fn with_program(&self, program: PathBuf) -> Result<Self, Refusal> {
+        self.description.run.check_other_program()?;
         files::register_input(&program).map_err(|error| named(&program, &error))?;
         Ok(Self { program, is_given: true, ..self.clone() })
     }
@@ -258,9 +259,8 @@ impl Engine {
         }
         // As of KiB for bytes.
         let (stated, least) = (report.peak_rss_bytes_total(), 100 * ranks as u64);
-        let is_more = |took: &u64| (1..took / least).contains(&stated);
-        if let Some(took) = finished.peak_rss_bytes.filter(is_more) {
-            return Err(format!("reports a peak memory of {stated} bytes, and took {took}"));
+        if finished.peak_rss_bytes.is_some_and(|took| (1..took / least).contains(&stated)) {
+            return Err(format!("reports a peak memory of {stated} bytes, and took far more"));
         }
         // The balance of ranks is that of this counter.
         let leaves = report.counters.get("leaves").filter(|of| of.len() == ranks);

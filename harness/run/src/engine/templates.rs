@@ -98,7 +98,7 @@ impl Templates {
         // On several ranks alone, where the mesh is then compared with that of other numbers.
         let is_compared = promises.is_independent_of(Independence::Ranks);
         let why =
-            "`independent_of` names partitioner, but not ranks, which vary with it: add \"ranks\"";
+            "`independent_of` names partitioner without ranks, which vary with it: add \"ranks\"";
         let on_partitioner = promises.independent_of.contains(&Independence::Partitioner);
         Failure::unless(is_compared || !on_partitioner, why)
     }
@@ -114,27 +114,29 @@ impl Templates {
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
             check_known(key, &words.cloned().collect::<Vec<_>>(), &own)?;
             let has = |text: &str| template.iter().any(|word| word.contains(text));
-            let why = format!("`{key}` has no {{program}}, in place of the program's name");
-            Failure::unless(has("{program}"), why)?;
-            let is_on_ranks = has("{ranks}") || has(LAUNCHER);
             let why = format!("`{key}` has no {{ranks}}, the number of ranks to start");
-            Failure::unless(key == "serial" || is_on_ranks, why)?;
-            let why = format!(
-                "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
-                 key `out`, as in out = [\"--out\", \"{{out}}\"]"
-            );
+            Failure::unless(key == "serial" || has("{ranks}") || has(LAUNCHER), why)?;
+            let why = format!("`{key}` has no {{out}}, for the mesh: add it, or the key `out`");
             Failure::unless(!needs_out || has("{out}"), why)?;
-            let is_given = has("{case}") || self.out.concat().contains("{case}");
             let why = format!("`{key}` has no {{case}}: add it, as in [\"mine\", \"{{case}}\"]");
-            Failure::unless(is_given, why)?;
+            Failure::unless(has("{case}") || self.out.concat().contains("{case}"), why)?;
         }
         check_known("serve", &self.serve, &[])?;
+        let is_served = self.serve.is_empty() || self.parallel.concat().contains("{program}");
+        Failure::unless(is_served, "`serve` needs the word {program} in `parallel`")?;
         self.appended().into_iter().try_for_each(|(key, of)| {
             let is_switch = ["ungraded", "time_alone"].contains(&key) || of.is_empty();
-            let why = format!("`{key}` has no {{{key}}}, so that it would choose nothing");
+            let why = format!("`{key}` has no {{{key}}}, which it is for");
             Failure::unless(is_switch || of.concat().contains(&format!("{{{key}}}")), why)?;
             check_known(key, of, &["case", key])
         })
+    }
+
+    /// Refuses another program for commands that do not contain the word for it.
+    pub(super) fn check_other_program(&self) -> Result<()> {
+        let fixed = |of: &[String]| !of.is_empty() && !of.concat().contains("{program}");
+        let why = "a command of the engine file has no {program}, so that no other one can be run";
+        Failure::unless(!self.commands().iter().any(|(_, words)| fixed(words)), why)
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
@@ -196,7 +198,7 @@ impl Templates {
 }
 
 /// Refuses placeholders of a template that have no value in it.
-fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<()> {
+pub(super) fn check_known(key: &str, words: &[String], own: &[&str]) -> Result<()> {
     let known = [&COMMON, own].concat();
     let mut named = words.iter().flat_map(|word| placeholders(word));
     let Some(name) = named.find(|name| !known.contains(name)) else { return Ok(()) };
