@@ -464,6 +464,24 @@ mod tests {
     }
 
     #[test]
+    fn a_peak_memory_in_another_unit_is_noticed() {
+        let place = tempfile::tempdir().unwrap();
+        let engine = Programs::find("mesher", &Default::default()).unwrap().mesher;
+        let options = RunOptions::new(place.path(), Duration::from_secs(1));
+        let (time_wall_s, time_cpu_s, stdout) = (1.0, 1.0, PathBuf::new());
+        let peak_rss_bytes = Some(9_000_000);
+        let finished = Finished { time_wall_s, time_cpu_s, stdout, peak_rss_bytes };
+        let report = |bytes: u64| {
+            let text = format!(r#"{{"cells": 8, "digest": "00", "peak_rss_bytes": {bytes}}}"#);
+            fs::write(options.report_path(), text).unwrap();
+            engine.report(None, &options, 2, &finished)
+        };
+        assert!(report(9_000).unwrap_err().contains("9000 bytes, and took far more"));
+        // That of rank 0 alone, and none.
+        assert!(report(4_500_000).is_ok() && report(0).is_ok());
+    }
+
+    #[test]
     fn the_words_that_make_ranks_stay_are_filled_in() {
         let programs = Programs::find("mesher", &Default::default()).unwrap();
         let mut engine = programs.mesher;
