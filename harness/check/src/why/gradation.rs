@@ -22,9 +22,9 @@
 
 use super::Mesh;
 use crate::checks::truth::Truth;
-use contract::manifest::Tree as MeshKind;
+use contract::manifest::{ExtentBox, Tree as MeshKind};
 use contract::neighbourhood::OFFSETS;
-use contract::octant::{LEVEL_MAX, Octant, edge_of};
+use contract::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL, edge_of};
 use contract::tree::Handle;
 use contract::word::{self, Side};
 use std::ops::RangeInclusive;
@@ -213,10 +213,22 @@ impl Search<'_> {
                 _ => return None,
             }
         }
-        match self.mesh.inputs.has_box_finer_than_surface() && self.counts_as_split(&at) {
+        match self.is_near_box(&at) && self.counts_as_split(&at) {
             true => self.descend(&at, content, true),
             false => self.leaf(at),
         }
+    }
+
+    /// Whether a box may be the cause that an octant in a crossing leaf of T0 is split. Each leaf that forces a split of level p is nearer than
+    /// (n - 1) / 2 cells of level p, and its parent is of a finer level or meets the box: all steps together are less than n + 1 cells.
+    fn is_near_box(&self, at: &Octant) -> bool {
+        let inputs = &self.mesh.inputs;
+        let reach = (i64::from(inputs.layer_cells_min) + 1) * edge_of(at.level) * UNITS_PER_CELL;
+        let near = |b: &ExtentBox| {
+            let (min, max) = (b.min.map(|q| q - reach), b.max.map(|q| q + reach));
+            ExtentBox { min, max, ..*b }.meets(at)
+        };
+        inputs.boxes.iter().any(|b| b.level > at.level && near(b))
     }
 
     /// Whether an octant is split before the step that is asked about. Above the parents of the leaves that are
