@@ -162,6 +162,8 @@ pub(super) struct Needs {
     absent: BTreeMap<Need, String>,
     /// Oracles that gave no answer.
     pub silent: RefCell<Vec<Failure>>,
+    /// What the files of a mesh lack for the proven checker.
+    pub unproven: RefCell<Option<String>>,
 }
 
 impl Needs {
@@ -213,10 +215,13 @@ impl Needs {
         cases: &[CaseReport],
         interrupted: bool,
     ) -> Vec<Missing> {
-        let Self { mut absent, silent, .. } = self;
+        let Self { mut absent, silent, unproven, .. } = self;
         // The vote needs all oracles, so one that is missing, or gave no answer on a case, counts as all.
         if let Some(failure) = silent.into_inner().first() {
             absent.entry(Need::Oracles).or_insert(failure.to_string());
+        }
+        if let Some(why) = unproven.into_inner() {
+            absent.insert(Need::Proof, why);
         }
         let lacks_geometry = |case: &&CaseReport| case.checks.iter().any(|c| c.name == GEOMETRY);
         let geometries = cases.iter().filter(lacks_geometry).count();

@@ -63,14 +63,16 @@ impl CaseRun<'_> {
 
     /// Has the proven checker judge the mesh, given its base tree.
     fn prove(&self, step: Step, serial: &Meshed, base: &Meshed) -> Result<Check, Failure> {
-        let options = self.all.options;
-        let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
-        match proven(&self.all.programs.paths.proven_checker, places, leaves, options.timeout) {
+        let (all, leaves) = (self.all, serial.mesh.words.len() as u64);
+        let (checker, places) =
+            (&all.programs.paths.proven_checker, (&*serial.place, &*base.place));
+        match proven(checker, places, leaves, all.options.timeout) {
             Ok(proof) => Ok(Check::of_result(step.0, CheckResult { name: step.1, ..proof })),
             // The files of another program may lack what the proof needs. OCaml has the same code for exceptions that nothing catches.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
-                if !options.require.contains(&Need::Proof) && !error.contains("exception") =>
+                if !error.contains("exception") =>
             {
+                all.needs.unproven.replace(Some(error.clone()));
                 Ok(Check::new(step.0, step.1, Outcome::left_out(error)))
             }
             Err(failure) => Err(failure),
