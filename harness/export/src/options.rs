@@ -1,7 +1,5 @@
-//! What every export is given, what it returns, and what it has written: counted as it is written, and compared with
-//! what was to be written before a file gets its name.
-//!
-//! Invariants of what was written:
+//! What every export is given, and what it returns. What is written is counted as it is written, and compared with what was to be written before
+//! a file gets its name:
 //! - octants ascend along the Morton curve without overlap and end in the root;
 //! - cells are as many as were selected, which another pass over the mesh has counted, or as all leaves of the mesh if there is no selection;
 //! - in a format without holes, octants and fillers tile the root.
@@ -13,8 +11,6 @@ use contract::case::Case;
 use contract::failure::{Failure, Result};
 use contract::import::TOLERANCE;
 use contract::mesh::Mesh;
-use contract::octant::Octant;
-use contract::word::{self, KEY_END};
 
 use crate::selection::Selection;
 
@@ -101,78 +97,4 @@ pub struct Summary {
     pub bytes: u64,
     /// What else the user should know, one line each.
     pub notes: Vec<String>,
-}
-
-/// Octants that were written.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Written {
-    /// Number of cells.
-    pub cells: u64,
-    /// Volume of all octants in level-19 cells.
-    pub volume: u64,
-    /// Morton code after the last octant.
-    end: u64,
-}
-
-impl Written {
-    /// Adds an octant, which is a cell or a filler.
-    ///
-    /// # Panics
-    /// If it does not follow the last one, or is not in the root.
-    pub(crate) fn add(&mut self, octant: &Octant, is_cell: bool) {
-        let (begin, last) = (word::key_of(octant.corner), self.end);
-        assert!(last <= begin, "an octant at {begin} is written after one that ends at {last}");
-        self.end = begin + word::span(octant.level);
-        assert!(self.end <= KEY_END, "an octant that ends at {} is outside of the root", self.end);
-        self.cells += u64::from(is_cell);
-        self.volume += self.end - begin;
-    }
-
-    /// Asserts that the cells are as many as were selected.
-    ///
-    /// # Panics
-    /// If they are not.
-    pub(crate) fn check_invariants(&self, selected: u64) {
-        assert_eq!(self.cells, selected, "cells written and leaves selected");
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use contract::testing::random_words;
-    use proptest::prelude::*;
-
-    fn written(words: &[u64]) -> Written {
-        let mut written = Written::default();
-        words.iter().for_each(|&w| written.add(&word::octant(w), true));
-        written
-    }
-
-    proptest! {
-        #[test]
-        fn leaves_in_order_are_accepted_and_any_other_order_or_number_is_noticed(
-            words in random_words(3), at in any::<prop::sample::Index>(), by in 1usize..9
-        ) {
-            prop_assume!(words.len() > 1);
-            let noticed = |changed: Vec<u64>| {
-                let check = || written(&changed).check_invariants(words.len() as u64);
-                std::panic::catch_unwind(check).is_err()
-            };
-            prop_assert!(!noticed(words.clone()));
-            let i = at.index(words.len());
-            let (mut fewer, mut swapped, mut twice) = (words.clone(), words.clone(), words.clone());
-            fewer.remove(i);
-            swapped.swap(i, (i + by % (words.len() - 1) + 1) % words.len());
-            twice.insert(i, words[i]);
-            prop_assert!(noticed(fewer) && noticed(twice));
-            prop_assert!(swapped == words || noticed(swapped));
-        }
-    }
-
-    #[test]
-    #[should_panic(expected = "outside of the root")]
-    fn an_octant_outside_of_the_root_is_noticed() {
-        Written::default().add(&Octant { corner: [1, 0, 0], level: 0 }, true);
-    }
 }

@@ -18,9 +18,9 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::mesh::Leaf;
 use contract::octant::{LEVEL_MAX, Octant};
-use contract::word::{self, KEY_END};
+use contract::word::{self, KEY_END, Order, Side};
 
-use crate::options::{Export, Summary, Written};
+use crate::options::{Export, Summary};
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
@@ -53,16 +53,18 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let bytes = files::fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         out.write_all(&start(0)).map_err(named)?;
-        let mut written = Written::default();
+        let (mut order, mut cells, mut volume) = (Order::default(), 0, 0);
         quadrants(export, &mut |octant, data| {
             count += 1;
-            written.add(&octant, data != FILLER);
+            order.add(word::encode(octant, Side::Outside)).expect("octants in order");
+            cells += u64::from(data != FILLER);
+            volume += word::span(octant.level);
             let [x, y, z] = octant.corner.map(|at| at << shift);
             out.write_all(bytemuck::bytes_of(&[x, y, z, octant.level.into()])).map_err(named)?;
             out.write_all(&[data]).map_err(named)
         })?;
-        written.check_invariants(leaves);
-        assert_eq!(written.volume, KEY_END, "quadrants tile the root");
+        let tiled = (leaves, KEY_END);
+        assert_eq!((cells, volume), tiled, "the selected leaves and fillers tile the root");
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;

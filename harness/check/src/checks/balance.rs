@@ -5,21 +5,12 @@
 //! unknown, it cannot detect imbalance between a deleted leaf and its neighbours.
 
 use super::clearance::{ALL_AXES, check_gap};
-use super::{Check, CheckResult, Subject, several_levels};
+use super::{CheckResult, Subject, several_levels};
 use crate::promises::Touching;
 use contract::lattice::Root;
 use contract::tree::Tree;
 
-pub(super) const CHECK: Check = Check {
-    name: "balance",
-    wanted: |subject| {
-        subject.promises.balance.is_some()
-            || subject.promises.definition && subject.inputs.tree == contract::manifest::Tree::Final
-    },
-    run,
-};
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let (tree, required) = match subject.promises.balance {
         Some(touching) => (subject.tree(), (touching, subject.promises.levels())),
         None => (subject.tree_with_deleted(), (Touching::Corner, 1)),

@@ -9,19 +9,13 @@
 
 use super::region::Survey;
 use super::truth::{Found, Truth};
-use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, contact, some_leaves};
+use super::{CheckResult, Subject, UNKNOWN_SIDES, contact, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
 use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::Side;
 
-pub(super) const CHECK: Check = Check {
-    name: "complete",
-    wanted: |subject| subject.promises.definition || subject.promises.complete,
-    run,
-};
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let (tree, terms) = (subject.tree(), &subject.terms);
     let deletes = terms.keep != Keep::All || !terms.keep_crossing;
     if !subject.promises.definition && deletes {

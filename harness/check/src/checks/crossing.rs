@@ -4,17 +4,14 @@
 //! of the surface's level. There is no band: one facet in one point decides.
 //! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does, if both are promised).
 
-use super::{Check, CheckResult, Subject, contact};
+use super::{CheckResult, Subject, contact};
 use contract::manifest::Sides;
 use contract::tree::Kind;
 use contract::word::Side;
 
-pub(super) const CHECK: Check =
-    Check { name: "crossing", wanted: |subject| subject.promises.crossing, run };
-
 const CROSSING: Kind = Side::Crossing as Kind;
 
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
         return super::unknown_sides(subject, true, result);
     }
@@ -45,7 +42,7 @@ mod tests {
         let check = |subject: Subject| {
             let crossing = crate::promises::Promises { crossing: true, ..Default::default() };
             let results = super::super::all(&subject.promising(&crossing));
-            results.into_iter().find(|result| result.name == CHECK.name).unwrap()
+            results.into_iter().find(|result| result.name == "crossing").unwrap()
         };
         let text =
             "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";

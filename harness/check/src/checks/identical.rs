@@ -4,7 +4,7 @@
 //! reference is the only correct one. The check cannot detect an error that both programs make; the other
 //! checks do.
 
-use super::{Check, CheckResult};
+use super::{CheckResult, Subject};
 use contract::lattice::Root;
 use contract::word;
 use std::fmt;
@@ -12,15 +12,11 @@ use std::fmt;
 /// Name of the check.
 pub const NAME: &str = "identical";
 
-pub(super) const CHECK: Check = Check {
-    name: NAME,
-    wanted: |subject| subject.reference.is_some(),
-    run: |subject, result| {
-        if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference) {
-            *result = compare(&mesh.words, &reference.words, &subject.terms.root);
-        }
-    },
-};
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
+    if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference) {
+        *result = compare(&mesh.words, &reference.words, &subject.terms.root);
+    }
+}
 
 /// Compares two sorted sequences of words. The total is the number of leaves in only one of them, and the one
 /// listed finding is the first difference.

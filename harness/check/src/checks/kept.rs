@@ -12,17 +12,14 @@
 
 use super::components::{self, Component};
 use super::manifest::COMPONENTS;
-use super::{Check, CheckResult, Subject, contact, json, some_leaves};
+use super::{CheckResult, Subject, contact, json, some_leaves};
 use contract::lattice::cell_at;
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides, Tree as Kind};
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check =
-    Check { name: "kept", wanted: |subject| subject.promises.definition, run };
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let Some(truth) = subject.truth() else {
         if subject.terms.sides == Sides::Unknown {
             return result.lacks(super::UNKNOWN_SIDES);

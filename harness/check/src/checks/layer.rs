@@ -10,22 +10,13 @@
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::spacing::Crossed;
-use super::{Check, CheckResult, Subject, UNKNOWN_INPUTS, contact, several_levels, some_leaves};
-use contract::manifest::{Keep, Manifest, Tree as MeshKind};
+use super::{CheckResult, Subject, UNKNOWN_INPUTS, contact, several_levels, some_leaves};
+use contract::manifest::{Keep, Manifest};
 use contract::octant::{Octant, edge_of};
 use contract::tree::{DELETED, Handle, Kind, Kinds, Tree};
 use contract::word::Side;
 
-pub(super) const CHECK: Check = Check {
-    name: "layer",
-    wanted: |subject| {
-        subject.promises.layers
-            || subject.promises.definition && subject.inputs.tree == MeshKind::Final
-    },
-    run,
-};
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let terms = &subject.terms;
     if terms.lacks_inputs {
         return result.lacks(UNKNOWN_INPUTS);

@@ -4,7 +4,7 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
 //! leaks and the ambiguous components, and `kept` the numbers of components.
 
-use super::{Check, CheckResult, Subject, json};
+use super::{CheckResult, Subject, json};
 use contract::lattice::Root;
 use contract::manifest::{BySide, ExtentBox, Geometry, Leak, Manifest, OCTANTS, Sides};
 use serde_json::{Value, json};
@@ -12,22 +12,19 @@ use serde_json::{Value, json};
 /// Name of the check.
 pub const NAME: &str = "manifest";
 
-pub(super) const CHECK: Check = Check { name: NAME, wanted: |_| true, run };
-
 /// The manifest states all that other checks compare with a case. If it does not, nothing is wrong with it, but less is shown. Formats of
 /// others state nothing of it.
-pub(super) const STATED: Check = Check {
-    name: "stated",
-    wanted: |s| {
-        s.promises.definition && s.case.is_some() && !optional_entries(s.manifest)[0].is_empty()
-    },
-    run: |subject, result| {
-        let [has, lacks] = optional_entries(subject.manifest);
-        (result.examined, result.note) = (has.len() as u64, has.join(", "));
-        let lacks = (!lacks.is_empty()).then(|| lacks.join(", "));
-        result.requires(lacks.map(|them| format!("the manifest does not state {them}")));
-    },
-};
+pub(super) fn states_all(subject: &Subject, result: &mut CheckResult) {
+    let [has, lacks] = optional_entries(subject.manifest);
+    (result.examined, result.note) = (has.len() as u64, has.join(", "));
+    let lacks = (!lacks.is_empty()).then(|| lacks.join(", "));
+    result.requires(lacks.map(|them| format!("the manifest does not state {them}")));
+}
+
+/// Whether the case is known, and the manifest states any of what it may leave out.
+pub(super) fn states_some(subject: &Subject) -> bool {
+    subject.case.is_some() && !optional_entries(subject.manifest)[0].is_empty()
+}
 
 /// What a manifest may leave out: the keys that it has, and those that it lacks.
 fn optional_entries(manifest: &Manifest) -> [Vec<&'static str>; 2] {
@@ -88,7 +85,7 @@ fn stated(manifest: &Manifest) -> Value {
     stated
 }
 
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let (manifest, tally) = (subject.manifest, &subject.pass.tally);
     let claimed = ("the manifest", manifest);
     let mut keys =

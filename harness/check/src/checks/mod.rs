@@ -27,6 +27,7 @@ pub mod truth;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Outcome};
 pub use subject::{CAPACITY, Subject};
 
+use crate::promises::Promises;
 use contract::tree::{Handle, Tree};
 use serde::Serialize;
 
@@ -46,36 +47,48 @@ pub const NO_LEAVES: &str = "the mesh has no leaves";
 pub struct Check {
     /// Its name in reports.
     pub name: &'static str,
-    /// Whether the mesh must have it.
-    wanted: fn(&Subject) -> bool,
+    /// Whether a mesh that keeps these promises must have it.
+    wanted: fn(&Promises, &Subject) -> bool,
     run: fn(&Subject, &mut CheckResult),
 }
 
+/// Name of the check that words ascend and no leaves overlap.
+const LINEAR: &str = "linear";
+
 /// All checks, in the order in which findings are most helpful.
 pub const CHECKS: [Check; 14] = [
-    manifest::CHECK,
-    manifest::STATED,
-    pass::CHECK,
-    complete::CHECK,
-    spacing::CHECK,
-    spacing::SURFACE,
-    spacing::BOXES,
-    crossing::CHECK,
-    sides::CHECK,
-    kept::CHECK,
-    balance::CHECK,
-    layer::CHECK,
-    splits::CHECK,
-    identical::CHECK,
+    check(manifest::NAME, |_, _| true, manifest::run),
+    check("stated", |p, s| p.definition && manifest::states_some(s), manifest::states_all),
+    check(LINEAR, |_, _| true, |s, result| result.clone_from(&s.pass.linear)),
+    check("complete", |p, _| p.definition || p.complete, complete::run),
+    check("spacing", |p, _| p.definition, spacing::run),
+    check("surface", |p, _| !p.definition && p.surface.is_some(), spacing::surface),
+    check("boxes", |p, _| !p.definition && p.boxes, spacing::boxes),
+    check("crossing", |p, _| p.crossing, crossing::run),
+    check("sides", |p, _| p.definition || p.sides.is_some(), sides::run),
+    check("kept", |p, _| p.definition, kept::run),
+    check("balance", |p, s| p.balance.is_some() || p.definition && s.is_final(), balance::run),
+    check("layer", |p, s| p.layers || p.definition && s.is_final(), layer::run),
+    // `identical` finds the same, by comparison.
+    check(SPLITS, |p, s| p.definition && s.case.is_some() && s.reference.is_none(), splits::run),
+    check(identical::NAME, |_, s| s.reference.is_some(), identical::run),
 ];
 
+const fn check(
+    name: &'static str,
+    wanted: fn(&Promises, &Subject) -> bool,
+    run: fn(&Subject, &mut CheckResult),
+) -> Check {
+    Check { name, wanted, run }
+}
+
 /// The checks that show nothing of a mesh but its form.
-pub const FORMAL: [&str; 3] = [manifest::CHECK.name, manifest::STATED.name, pass::CHECK.name];
+pub const FORMAL: [&str; 3] = [manifest::NAME, "stated", LINEAR];
 
 /// Runs all checks that the subject must pass.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
     let is_of_files = |c: &Check| FORMAL.contains(&c.name);
-    let wanted = CHECKS.iter().filter(|check| (check.wanted)(subject));
+    let wanted = CHECKS.iter().filter(|check| (check.wanted)(&subject.promises, subject));
     // Counts and digests need no tree.
     let capacity = subject.capacity();
     let is_possible = capacity.as_ref().is_none_or(CheckResult::holds);

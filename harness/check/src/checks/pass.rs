@@ -3,8 +3,8 @@
 //! The check `linear`: every word is a leaf, each part is sorted, and no two leaves overlap. Sections 7 and 8 of
 //! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` does).
 
+use super::CheckResult;
 use super::identical::Named;
-use super::{Check, CheckResult};
 use contract::failure::Result;
 use contract::htg::Block;
 use contract::leafset::LeafSet;
@@ -68,7 +68,7 @@ impl State {
         let last_of_part = vec![None; parts.len()];
         let mut tally = Manifest { root: manifest.root, parts, ..Manifest::default() };
         tally.clear_leaves();
-        let (linear, builder) = (CheckResult::new(CHECK.name), Builder::default());
+        let (linear, builder) = (CheckResult::new(super::LINEAR), Builder::default());
         Self { nodes_max, tally, linear, last_of_part, last: 0, builder }
     }
 
@@ -114,12 +114,6 @@ impl State {
 }
 
 /// The pass over the leaves has found what there is to report.
-pub(super) const CHECK: Check = Check {
-    name: "linear",
-    wanted: |_| true,
-    run: |subject, result| result.clone_from(&subject.pass.linear),
-};
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,7 +125,7 @@ mod tests {
         let mut mesh = leaf_set(vec![words_of(|o| o.level < 1)]);
         let check = |mesh: &LeafSet| {
             let results = super::super::all(&Subject::new(None, mesh.manifest.tree, mesh));
-            results.into_iter().find(|result| result.name == CHECK.name).unwrap()
+            results.into_iter().find(|result| result.name == super::super::LINEAR).unwrap()
         };
         let result = check(&mesh);
         assert_eq!((result.examined, result.findings_total), (8, 0));

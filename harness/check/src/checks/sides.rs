@@ -11,7 +11,7 @@
 use super::components::{self, Component};
 use super::region::Survey;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, contact, some_leaves};
+use super::{CheckResult, Subject, contact, some_leaves};
 use crate::oracle::is_closed;
 use contract::case::Case;
 use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};
@@ -19,13 +19,7 @@ use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Tree};
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check = Check {
-    name: "sides",
-    wanted: |subject| subject.promises.definition || subject.promises.sides.is_some(),
-    run,
-};
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
         return super::unknown_sides(subject, subject.promises.sides.is_some(), result);
     }

@@ -11,31 +11,24 @@
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::truth::Facets;
-use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
+use super::{CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::{ExtentBox, Manifest};
 use contract::octant::Octant;
 use contract::tree::{Builder, DELETED, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check =
-    Check { name: "spacing", wanted: |subject| subject.promises.definition, run };
-
 /// The promise of boxes alone.
-pub(super) const BOXES: Check = Check {
-    name: "boxes",
-    wanted: |subject| !subject.promises.definition && subject.promises.boxes,
-    run: |subject, result| {
-        let (tree, terms) = (subject.tree(), &subject.terms);
-        boxes_met(tree, terms, result);
-        let is_met = |octant: &Octant, _| terms.boxes.iter().any(|extent| extent.meets(octant));
-        tree.walk_where(is_met, &mut |_, at| result.examined += u64::from(at != Handle::HOLE));
-        let none = "no leaf meets a box of the case";
-        result.needs_objects(if terms.lacks_inputs { UNKNOWN_INPUTS } else { none });
-    },
-};
+pub(super) fn boxes(subject: &Subject, result: &mut CheckResult) {
+    let (tree, terms) = (subject.tree(), &subject.terms);
+    boxes_met(tree, terms, result);
+    let is_met = |octant: &Octant, _| terms.boxes.iter().any(|extent| extent.meets(octant));
+    tree.walk_where(is_met, &mut |_, at| result.examined += u64::from(at != Handle::HOLE));
+    let none = "no leaf meets a box of the case";
+    result.needs_objects(if terms.lacks_inputs { UNKNOWN_INPUTS } else { none });
+}
 
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let (tree, terms) = (subject.tree(), &subject.terms);
     if terms.lacks_inputs {
         return result.lacks(UNKNOWN_INPUTS);
@@ -94,14 +87,12 @@ fn none_finer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 }
 
 /// The promise of the surface alone.
-pub(super) const SURFACE: Check = Check {
-    name: "surface",
-    wanted: |subject| !subject.promises.definition && subject.promises.surface.is_some(),
-    run: |subject, result| match Crossed::of(subject) {
+pub(super) fn surface(subject: &Subject, result: &mut CheckResult) {
+    match Crossed::of(subject) {
         Some(crossed) => crossed.check(subject.tree(), result),
         None => result.lacks(NO_GEOMETRY),
-    },
-};
+    }
+}
 
 /// The facets and the depth to which they may reach into a leaf.
 pub struct Crossed<'a> {

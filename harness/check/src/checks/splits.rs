@@ -7,7 +7,7 @@
 
 use std::fs;
 
-use super::{Check, CheckResult, Subject};
+use super::{CheckResult, Subject};
 use crate::why::Mesh;
 use contract::number::labelled;
 
@@ -16,16 +16,7 @@ pub(crate) const NAME: &str = "splits";
 /// Memory that the audit takes for each leaf: 22 bytes were measured on 4 million cells, and tables double when they are full.
 const BYTES_PER_LEAF: u64 = 40;
 
-pub(super) const CHECK: Check = Check {
-    name: NAME,
-    // `identical` finds the same, by comparison.
-    wanted: |subject| {
-        subject.promises.definition && subject.case.is_some() && subject.reference.is_none()
-    },
-    run,
-};
-
-fn run(subject: &Subject, result: &mut CheckResult) {
+pub(super) fn run(subject: &Subject, result: &mut CheckResult) {
     let Some(truth) = subject.truth() else {
         return result.lacks("T0 does not fit its limit, as `capacity` states");
     };

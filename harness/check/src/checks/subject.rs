@@ -116,6 +116,11 @@ impl<'a> Subject<'a> {
         self.truth.get_or_init(|| Truth::of(case, &self.inputs)).as_ref()
     }
 
+    /// Whether the mesh must be the tree after gradation.
+    pub(super) fn is_final(&self) -> bool {
+        self.inputs.tree == Kind::Final
+    }
+
     /// What a check that compares the mesh with T0 examines: its leaves or, if there are none, those of T0.
     pub(super) fn examined_with(&self, truth: &Truth) -> u64 {
         let leaves = self.pass.tally.leaves;

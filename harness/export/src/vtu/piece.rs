@@ -9,11 +9,10 @@ use bytemuck::NoUninit;
 use contract::digest::Digest;
 use contract::lattice::Root;
 use contract::mesh::Leaf;
-use contract::word;
+use contract::word::{self, Order};
 use libdeflater::{CompressionLvl, Compressor};
 
 use super::Array;
-use crate::options::Written;
 use crate::points::{Points, to_user};
 
 /// VTK's number of the cell type hexahedron.
@@ -40,8 +39,9 @@ pub struct Piece {
 pub struct Encoder {
     /// The leaves of the next piece, which are in Morton order.
     pub leaves: Vec<Leaf>,
-    /// The cells of all pieces.
-    pub written: Written,
+    /// The number of cells of all pieces.
+    pub cells: u64,
+    order: Order,
     /// The digest of their leaves.
     pub digest: Digest,
     points: Points,
@@ -56,9 +56,11 @@ impl Encoder {
         self.connect();
         self.check_invariants();
         for Leaf { octant, side, .. } in &self.leaves {
-            self.written.add(octant, true);
-            self.digest.add(word::encode(*octant, *side));
+            let word = word::encode(*octant, *side);
+            self.order.add(word).expect("leaves are in order");
+            self.digest.add(word);
         }
+        self.cells += self.leaves.len() as u64;
         let Self { leaves, points, connectivity, zlib, .. } = self;
         let points = &points.all;
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);

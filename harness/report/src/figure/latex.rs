@@ -183,33 +183,18 @@ pub fn table(table: &Table) -> String {
 
 /// The text with what is special to LaTeX escaped.
 fn escape(text: &str) -> String {
-    let escaped = |c: char| match c {
-        '\\' => "\\textbackslash{}".to_owned(),
-        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
-        '~' => "\\textasciitilde{}".to_owned(),
-        '^' => "\\textasciicircum{}".to_owned(),
-        '<' => "\\textless{}".to_owned(),
-        '>' => "\\textgreater{}".to_owned(),
-        '`' => "'".to_owned(),
-        '·' => "$\\cdot$".to_owned(),
-        'λ' => "$\\lambda$".to_owned(),
-        '–' => "--".to_owned(),
-        'µ' => "$\\mu$".to_owned(),
-        '×' => "$\\times$".to_owned(),
-        '⁻' => "$^-$".to_owned(),
-        '√' => "$\\surd$".to_owned(),
-        '₂' => "$_2$".to_owned(),
-        '⌈' => "$\\lceil$".to_owned(),
-        '⌉' => "$\\rceil$".to_owned(),
-        '⌊' => "$\\lfloor$".to_owned(),
-        '⌋' => "$\\rfloor$".to_owned(),
-        _ => match SUPERSCRIPTS.iter().position(|s| *s == c) {
-            Some(digit) => format!("$^{digit}$"),
-            None => c.to_string(),
-        },
+    let escaped = |c: char| match SUPERSCRIPTS.iter().position(|s| *s == c) {
+        Some(digit) => format!("$^{digit}$"),
+        None => ESCAPES
+            .split(' ')
+            .find_map(|of| of.strip_prefix(c))
+            .map_or_else(|| c.to_string(), str::to_owned),
     };
     text.chars().map(escaped).collect()
 }
+
+/// Characters that are special to LaTeX, each with what stands for it.
+const ESCAPES: &str = r"\\textbackslash{} &\& %\% $\$ #\# _\_ {\{ }\} ~\textasciitilde{} ^\textasciicircum{} <\textless{} >\textgreater{} `' ·$\cdot$ λ$\lambda$ –-- µ$\mu$ ×$\times$ ⁻$^-$ √$\surd$ ₂$_2$ ⌈$\lceil$ ⌉$\rceil$ ⌊$\lfloor$ ⌋$\rfloor$";
 
 #[cfg(test)]
 mod tests {
