@@ -70,15 +70,36 @@ impl Mesh<'_> {
 
     /// Whether an octant is deep, or justified, which is sought once.
     fn remembered(&self, octant: &Octant, deep: bool, seek: impl Fn() -> bool) -> bool {
-        // The bits of an octant's path after a one: the hash needs low bits that differ.
-        let path = (1 << 57 | word::key_of(octant.corner)) >> (3 * (LEVEL_MAX - octant.level));
-        let id = path << 1 | u64::from(deep);
+        let id = path_of(octant) << 1 | u64::from(deep);
         if let Some(&known) = self.known.borrow().get(&id) {
             return known;
         }
         let found = seek();
         self.known.borrow_mut().insert(id, found);
         found
+    }
+
+    /// The levels of sources in an octant with this content, as a mask that is complete from `first` on: of leaves whose parent is deep, and of
+    /// all that deleted crossing leaves may have.
+    fn sources(&self, octant: &Octant, content: Handle, first: u8) -> u32 {
+        if !content.is_node() {
+            let is_deleted = content.as_leaf().is_none() && self.has_deleted_crossing();
+            return if is_deleted && self.is_crossed(octant) { u32::MAX } else { 0 };
+        }
+        let (path, level) = (path_of(octant), octant.level);
+        match self.sources.borrow().get(&path) {
+            Some(&(from, levels)) if from <= first => return levels,
+            _ => {}
+        }
+        let children =
+            || (0..8).map(|digit| (octant.child(digit), self.tree.child(content, digit, level)));
+        let below = children().fold(0, |all, (at, of)| all | self.sources(&at, of, first));
+        // Below a needless split, nothing counts.
+        let is_leaf = |(at, of): (Octant, Handle)| !of.is_node() || !self.is_justified(&at);
+        let has_own = level + 1 >= first && self.is_deep(octant) && children().any(is_leaf);
+        let levels = below | u32::from(has_own) << (level + 1);
+        self.sources.borrow_mut().insert(path, (first, levels));
+        levels
     }
 
     /// The rule by which a finer leaf forces an octant to split.
@@ -174,6 +195,11 @@ impl Mesh<'_> {
     }
 }
 
+/// The bits of an octant's path after a one: the hash needs low bits that differ.
+fn path_of(octant: &Octant) -> u64 {
+    (1 << 57 | word::key_of(octant.corner)) >> (3 * (LEVEL_MAX - octant.level))
+}
+
 /// A search for a leaf of levels `first` to `last` that forces an octant to split.
 struct Search<'a> {
     mesh: &'a Mesh<'a>,
@@ -193,9 +219,19 @@ impl Search<'_> {
             () if at == *self.octant || is_far => None,
             () if is_hole && !self.mesh.has_deleted_crossing() => None,
             () if is_hole => self.hole(at, handle, in_deleted),
-            () if handle.is_node() && self.counts_as_split(&at) => self.descend(&at, handle, false),
+            () if handle.is_node() && self.counts_as_split(&at) => {
+                let may_force = distance == 0 || self.reaches(&at, handle, distance);
+                may_force.then(|| self.descend(&at, handle, false)).flatten()
+            }
             () => self.leaf(at),
         }
+    }
+
+    /// Whether a source in an octant that does not touch the one in question may be near enough.
+    fn reaches(&self, at: &Octant, content: Handle, distance: i64) -> bool {
+        let sources = self.mesh.sources(at, content, self.first);
+        let is_near = |l: u8| sources >> l & 1 != 0 && distance < self.mesh.layer_reach(l);
+        (self.first..=self.last).any(is_near)
     }
 
     fn descend(&self, at: &Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {

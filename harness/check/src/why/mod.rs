@@ -66,13 +66,22 @@ pub struct Mesh<'a> {
     level_deepest: u8,
     /// Answers to questions that were asked before.
     known: RefCell<FxHashMap<u64, bool>>,
+    /// The levels of the sources in octants with children, as masks that are complete from a level on.
+    sources: RefCell<FxHashMap<u64, (u8, u32)>>,
 }
 
 impl<'a> Mesh<'a> {
     /// A mesh of this body. Without it, facets are not known.
     pub fn of(manifest: &Manifest, tree: &'a Tree, body: Option<&'a Truth>) -> Self {
         let (inputs, level_deepest) = (manifest.of_leaves(), manifest.level_deepest());
-        Self { tree, inputs, body, level_deepest, known: RefCell::default() }
+        Self {
+            tree,
+            inputs,
+            body,
+            level_deepest,
+            known: RefCell::default(),
+            sources: RefCell::default(),
+        }
     }
 
     /// Whether it is known where the surface is: from the facets, or from the crossing leaves of the mesh.
