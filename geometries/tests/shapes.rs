@@ -283,3 +283,13 @@ fn invalid_tables_are_refused_with_the_reason() {
         assert!(message.contains(reason), "{text}\n{message}");
     }
 }
+
+#[test]
+fn lists_that_are_too_long_are_refused() {
+    let refused = |centre: &str| {
+        let text = format!("shape = 'cube'\nfacets = 12\ncentre = {centre}\nedge = inf\n");
+        geometries::refuse_surplus::<Generator>(&text).is_err()
+    };
+    assert!(refused("[0, 1, 2, 3]") && !refused("[0, 1, 2]") && !refused("'x'"));
+    assert!(geometries::refuse_surplus::<Vec<f64>>("not toml").is_ok());
+}

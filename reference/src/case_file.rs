@@ -152,6 +152,7 @@ pub fn read(path: &Path) -> Result<Case, Error> {
     let text = String::from_utf8(read_file(path)?)
         .map_err(|error| invalid(format!("{error}; save it as UTF-8")))?;
     let file: CaseFile = toml::from_str(&text).map_err(|error| invalid(explain(&error, &text)))?;
+    geometries::refuse_surplus::<CaseFile>(&text).map_err(invalid)?;
     let facets: Vec<stl::Facet> = match (&file.geometry, &file.generator) {
         (Some(geometry), None) => {
             stl::read(&path.parent().unwrap_or(Path::new("")).join(geometry))?

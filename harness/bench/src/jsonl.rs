@@ -65,6 +65,7 @@ pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
     } else if !last.is_empty() {
         length -= last.len() as u64;
         file.set_len(length)?;
+        eprintln!("harness: {}: its last line was unfinished and is removed", path.display());
     }
     file.write_all(text.as_bytes()).and_then(|()| file.sync_data()).inspect_err(|_| {
         // Nobody else has appended since, because of the lock.

@@ -53,7 +53,9 @@ fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
 /// Reads a TOML file.
 fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Input> {
     let text = contract::files::read_text(path).map_err(|error| Input::at(path, error))?;
-    toml::from_str(&text).map_err(|error| Input::about(path, error))
+    let read = toml::from_str(&text).map_err(|error| Input::about(path, error))?;
+    geometries::refuse_surplus::<T>(&text).map_err(|why| Input::about(path, why))?;
+    Ok(read)
 }
 
 /// Creates an empty directory for one run of an engine.

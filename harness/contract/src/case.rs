@@ -82,6 +82,7 @@ impl Case {
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, DEFINITION)))?;
+        geometries::refuse_surplus::<CaseFile>(&text).map_err(wrong)?;
         let Body { facets, solids } = match (&file.geometry, &file.generator) {
             (Some(stl), None) => stl::read(&path.with_file_name(stl))?,
             (None, Some(generator)) => {
@@ -101,6 +102,7 @@ impl Case {
     /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
         let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e, DEFINITION))?;
+        geometries::refuse_surplus::<CaseFile>(text)?;
         Self::build("in-memory".to_owned(), (text, &file), facets).map_err(|failure| failure.why)
     }
 
@@ -371,6 +373,12 @@ mod tests {
                 .starts_with("line 1, spacing_mim: unknown field `spacing_mim`, expected one of"),
             "{unknown}"
         );
+        for surplus in ["seeds = [[0, 0, 0, 1]]", "root = [[0, 0, 0], 8, 1]"] {
+            assert!(
+                why(&format!("spacing_min = 1.0\n{surplus}")).contains("too long"),
+                "{surplus}"
+            );
+        }
         let map = why("spacing_min = 1.0\nlayer_cells_min = { a = 1 }");
         assert!(map.contains("line 2, layer_cells_min: invalid type: map"), "{map}");
         let word = why("spacing_min = \"fine\"");

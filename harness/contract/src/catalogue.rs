@@ -78,7 +78,9 @@ impl Catalogue {
             case.name = numbered(&case.name, '-', is_free);
             selected.push(case);
         }
-        Ok(selected)
+        // An input that is an output, too, is found before work begins.
+        selected.iter().for_each(|case| drop(missing_geometry(&case.path)));
+        ::files::clash().map_or(Ok(selected), |why| Err(why.to_owned()))
     }
 
     /// The case of the catalogue with this name.
@@ -144,7 +146,8 @@ fn is_path(argument: &str) -> bool {
 fn missing_geometry(case: &Path) -> Option<String> {
     let table = files::read_text(case).ok()?.parse::<toml::Table>().ok()?;
     let geometry = table.get("geometry")?.as_str()?;
-    let exists = case.parent()?.join(geometry).exists();
+    let path = case.parent()?.join(geometry);
+    let exists = ::files::register_input(&path).is_err() || path.exists();
     let why = "is missing; ci/setup --geometries fetches it if it can be fetched";
     (!exists).then(|| format!("{geometry} {why}"))
 }

@@ -37,7 +37,12 @@ pub const FORMATS: &[Format] = &[
     Format {
         ending: ".mfem",
         purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
-        write: |export, path| made("mfem", ("mesh.p8est", p8est::write), export, path),
+        write: |export, path| {
+            let mut written = made("mfem", ("mesh.p8est", p8est::write), export, path)?;
+            // The others are of the forest that it was made of.
+            written.notes.truncate(1);
+            Ok(written)
+        },
     },
     Format {
         ending: ".vtkhdf",

@@ -68,14 +68,14 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
         let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root; p4est";
+    let fillers = count - leaves;
+    let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root";
     let whose = match shift {
-        0 => {
-            "before mid-2020 loads this file: a name that ends in .30.p8est makes one for those since"
-        }
-        _ => "since mid-2020 loads this file, and none before",
+        0 => "before mid-2020 loads it: a name that ends in .30.p8est makes one for those since",
+        _ => "since mid-2020 loads it, and none before",
     };
-    Ok(Summary { leaves, bytes, notes: vec![format!("{} {what} {whose}", count - leaves)] })
+    let notes = vec![format!("{fillers} {what}"), format!("the file is for p4est, which {whose}")];
+    Ok(Summary { leaves, bytes, notes })
 }
 
 /// Visits the quadrants of the forest in Morton order, with their data.

@@ -92,6 +92,7 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
 pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
     let case = || {
         let mut keys: Keys = toml::from_str(text).map_err(|e| explain(text, &e))?;
+        geometries::refuse_surplus::<Keys>(text)?;
         let source = match (keys.geometry.take(), keys.generator.take()) {
             (Some(file), None) => Ok(Source::Stl(path.with_file_name(file))),
             (None, Some(generator)) => Ok(Source::Generated(generator)),
@@ -174,6 +175,10 @@ mod tests {
             (
                 "geometry = \"a.stl\"\nspacing_min = 0.5\n[root]\norigin = [0,0,0]\n",
                 "line 3: missing field `edge`",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nseeds = [[0, 0, 0,  1, 1, 1]]\n",
+                "a list that is too long (invalid length 6",
             ),
             ("geometry = ", "line 1"),
             ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1: invalid type: map"),

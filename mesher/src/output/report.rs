@@ -185,11 +185,10 @@ impl fmt::Display for Report {
             let (cpu, lambda) = (time_cpu_s.iter().sum::<f64>(), imbalance(time_cpu_s));
             writeln!(f, "  {name:<12} {wall:>10.3} {cpu:>9.3}   {lambda:>8.3}")?;
         }
-        let (cells, wall) = (self.cells.max(1) as f64, self.time_wall_s);
-        let rate = cells / wall.max(1e-9) / 1e6;
-        writeln!(f, "time           {wall:.3} s wall, {rate:.2} M cells/s")?;
+        let (cells, wall) = (self.cells as f64, self.time_wall_s);
         let peak = self.peak_rss_bytes.iter().sum::<u64>() as f64;
-        let (peak_mb, per_cell) = (peak / 1e6, peak / cells);
+        let (rate, peak_mb, per_cell) = (cells / wall.max(1e-9) / 1e6, peak / 1e6, peak / cells);
+        writeln!(f, "time           {wall:.3} s wall, {rate:.2} M cells/s")?;
         write!(f, "peak memory    {peak_mb:.1} MB over all ranks, {per_cell:.2} bytes per cell")
     }
 }

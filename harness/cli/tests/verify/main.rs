@@ -121,6 +121,7 @@ fn a_geometry_that_the_report_would_replace_is_invalid_input() {
     assert!(outcome.printed.contains("give the output another name"), "{}", outcome.printed);
     assert!(!outcome.printed.contains("accepts"), "{}", outcome.printed);
     assert_eq!(fixture.read("body.stl"), "solid body");
+    assert!(fixture.temporary_files().is_empty(), "{:?}", fixture.temporary_files());
 }
 
 #[test]

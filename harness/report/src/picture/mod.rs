@@ -137,7 +137,8 @@ impl Picture {
             cube
         });
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
-        let why = "the clip box has no area in the plane of the slice: give a larger one";
+        let why =
+            "the clip box has no area in the plane of the slice within the root: give another one";
         Failure::unless((0..2).all(|i| window[0][i] < window[1][i]), why)?;
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
         let part = Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };

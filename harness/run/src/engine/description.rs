@@ -152,6 +152,7 @@ impl Description {
     pub fn parse(text: &str) -> Result<Self> {
         let page = PAGE.split_once("## Promises").map_or(PAGE, |(_, page)| page);
         let mut description: Self = toml::from_str(text).map_err(|e| explain(text, &e, page))?;
+        geometries::refuse_surplus::<Self>(text)?;
         description.promises.fault().map_or(Ok(()), |why| Err(Failure::input(why)))?;
         let templates = &mut description.run;
         if let Some(first) = named_program(&templates.serial).cloned() {
