@@ -198,7 +198,8 @@ pub fn duplicates(input: &Input, of: &Edges, solids: &BTreeMap<u32, i64>, first:
     }
     let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
     let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
-    let passes = |copies: &[u32]| copies.len() % 2 == 1 || !input.is_meshed(true) && touch(copies);
+    let passes =
+        |copies: &[u32]| copies.len() % 2 == 1 || !input.are_walls_meshed() && touch(copies);
     let changing =
         copies.values().filter(|copies| input.are_seeds_beyond != Some(true) && !passes(copies));
     finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();

@@ -142,13 +142,13 @@ impl Kind {
             Self::InsideOut => ("closed shells inside out",
                 "No effect, but normals point inward: other programs may exchange inside and outside."),
             Self::Nested => ("closed shells in other shells",
-                "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep, a seed lies in it or the root cuts it. Remove the inner shell if it was meant as a solid."),
+                "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep, a seed lies in it or the root cuts it, and its crossing leaves stay unless keep_crossing is false. Remove the inner shell if it was meant as a solid."),
             Self::Stray => ("facets without area, apart",
                 "They cross every leaf that they touch like the others, and leave holes in the flow where crossing leaves are deleted. Remove them."),
             Self::Duplicates => ("duplicate facets",
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Keep one of the copies where the body ends, and none within it: two are a wall in the inside."),
             Self::Intersections => ("intersecting pairs of facets",
-                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity that the root does not cut. Where they touch, there is a wall in the inside. Unite the shells if that is not meant."),
+                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity that the root does not cut. Where they touch, there is a wall in the inside. Crossing leaves stay in both unless keep_crossing is false. Unite the shells if that is not meant."),
             Self::Overlaps => ("facets within another solid",
                 "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity that the root does not cut. Unite them if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
@@ -215,7 +215,7 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
             finding.count_changing, finding.count, number(width)
         ),
         Kind::Duplicates if finding.count_changing == 0 => {
-            "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, are a wall only where the inside is meshed.".into()
+            "No effect: rays pass an odd number of copies like one, and two back to back, where solids touch, are a wall only where the inside is meshed or crossing leaves stay.".into()
         }
         Kind::Intersections | Kind::Overlaps if !input.are_overlaps_meshed() => {
             "No effect: where solids overlap is outside, but enclosed, so that it is deleted like a cavity, and crossing leaves are deleted, too.".into()

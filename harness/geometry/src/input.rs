@@ -112,6 +112,11 @@ impl Input {
         self.are_seeds_beyond.map_or_else(by_rays, |are_beyond| !are_beyond)
     }
 
+    /// Whether a wall between solids can change the region: within it, or by the crossing leaves on the wall.
+    pub fn are_walls_meshed(&self) -> bool {
+        self.is_meshed(true) || self.are_seeds_beyond.is_none() && self.case.keep_crossing
+    }
+
     /// Whether an overlap of solids can change the region: such a space, crossing leaves in it, or one that may reach the root's boundary.
     pub fn are_overlaps_meshed(&self) -> bool {
         let cell = self.cell.unwrap_or(self.case.root.edge_of(LEVEL_MAX));

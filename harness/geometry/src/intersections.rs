@@ -44,7 +44,7 @@ pub fn intersections(input: &Input, tree: &FacetTree, shells: &Shells, first: us
     let is_rounding = |&(f, g): &(u32, u32)| {
         let agree = shells.outward(f).zip(shells.outward(g)).map(|(f, g)| f == g);
         let is_opposite = agree.map(|agree| agree == (dot(normal(facet(f)), normal(facet(g))) < 0));
-        let is_shifted = is_opposite == Some(true) && !input.is_meshed(true);
+        let is_shifted = is_opposite == Some(true) && !input.are_walls_meshed();
         !are_meshed || depth((facet(f), facet(g)), is_shifted) <= ROUNDING
     };
     pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));

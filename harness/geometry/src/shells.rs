@@ -131,9 +131,9 @@ impl Shells {
                 continue;
             }
             let at = usize::from(shell.is_nested);
-            // A solid in a solid is a space, which is meshed with what is around it, with enclosed space, or from a seed in it.
+            // A solid in a solid is a space, like an overlap.
             let is_space = shell.is_nested && !(shell.is_oriented && shell.is_cavity);
-            findings[at].count_changing += u64::from(is_space && input.is_space_meshed());
+            findings[at].count_changing += u64::from(is_space && input.are_overlaps_meshed());
             let facet = shell.facet_first;
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
         }

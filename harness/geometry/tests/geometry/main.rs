@@ -235,11 +235,12 @@ fn case(facets: &[Facet], rules: &str) -> Diagnosis {
 
 /// Equal facets, or others in one plane, back to back, are a wall in the flow through both solids. A solid in a solid is a space.
 #[test]
-fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
+fn where_solids_touch_and_solids_in_solids_change_the_region_if_leaves_within_are_kept() {
     let seeds = |within: bool| format!("seeds = [[{}, 3.5, 3.5]]", if within { 0.5 } else { -9.0 });
     let [within, beyond] = [true, false].map(seeds);
     let rules = [
-        ("", false),
+        // Crossing leaves within the body stay in the mesh.
+        ("", true),
         ("keep_crossing = false", false),
         ("keep = 'inside'", true),
         ("keep = 'all'", true),
@@ -343,11 +344,14 @@ fn where_solids_touch_and_solids_in_solids_change_the_region_if_it_is_within() {
 
 /// As in assemblies: the copies are within the body, unless one of the solids is there twice, once inside out.
 #[test]
-fn solids_that_touch_in_equal_facets_do_not_change_the_region() {
+fn solids_that_touch_in_equal_facets_change_the_region_by_their_crossing_leaves_alone() {
     let touching = [cube(), cuboid([4.0, 0.0, 0.0], [8.0, 4.0, 4.0])].concat();
-    let found = diagnosis(touching.clone(), Some(0.25));
-    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Duplicates, 2)], false));
-    assert!(found.to_string().contains("where solids touch"));
+    for keeps_crossing in [false, true] {
+        let found = case(&touching, &format!("keep_crossing = {keeps_crossing}"));
+        let expected = (vec![(Kind::Duplicates, 2)], keeps_crossing);
+        assert_eq!((counts(&found), found.changes_region), expected);
+        assert_eq!(found.to_string().contains("where solids touch"), !keeps_crossing, "{found}");
+    }
     let mut inward = cube();
     inward.iter_mut().for_each(|facet| facet.swap(0, 1));
     let beside = cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0]);
@@ -379,10 +383,10 @@ fn a_closed_shell_that_is_wound_inward_is_inside_out_or_a_cavity() {
         counts(&diagnosis([cube(), small.clone()].concat(), Some(0.25))),
         [(Kind::Nested, 1)]
     );
-    // A solid in a solid is outside, which changes what an internal mesh keeps; one in the cavity of another is not.
+    // The crossing leaves of a solid in a solid stay in the mesh; one in the cavity of another is in the flow.
     let solid = cuboid([1.25; 3], [1.75; 3]);
     let nested = diagnosis([cube(), solid.clone()].concat(), Some(0.125));
-    assert_eq!((counts(&nested), nested.changes_region), (vec![(Kind::Nested, 1)], false));
+    assert_eq!((counts(&nested), nested.changes_region), (vec![(Kind::Nested, 1)], true));
     let in_cavity = diagnosis([cube(), small.clone(), solid].concat(), Some(0.25));
     assert_eq!(count(&in_cavity, Kind::Nested), 1);
     // An open shell has no volume.
