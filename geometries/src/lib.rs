@@ -26,12 +26,12 @@ pub type Facet = [[f32; 3]; 3];
 /// Reads the text of a file again, as a reader that counts: `toml` ignores what a list has beyond the numbers that are read.
 ///
 /// # Errors
-/// One sentence, if a list is longer than what `T` reads of it. What else is wrong is not said.
+/// One sentence, if a list is longer than what `T` reads of it. What else is wrong is not said, and what is not finite may hide it.
 pub fn refuse_surplus<T: DeserializeOwned>(text: &str) -> Result<(), String> {
     let value = toml::from_str(text).map(serde_json::from_value::<T>);
     match value {
         Ok(Err(why)) if why.to_string().starts_with("invalid length") => Err(format!(
-            "a point or a table is a list that is too long ({why}): a point has three numbers, and brackets of its own"
+            "a list is longer than what is read of it ({why}): a point, for example, has three numbers, and brackets of its own"
         )),
         _ => Ok(()),
     }

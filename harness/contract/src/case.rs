@@ -375,7 +375,7 @@ mod tests {
         );
         for surplus in ["seeds = [[0, 0, 0, 1]]", "root = [[0, 0, 0], 8, 1]"] {
             assert!(
-                why(&format!("spacing_min = 1.0\n{surplus}")).contains("too long"),
+                why(&format!("spacing_min = 1.0\n{surplus}")).contains("longer than"),
                 "{surplus}"
             );
         }

@@ -2,6 +2,7 @@
 
 use crate::files;
 use crate::number::numbered;
+use ::files::{clash, register_input};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf, absolute};
 use std::{fs, io};
@@ -55,11 +56,11 @@ impl Catalogue {
     /// # Errors
     /// One sentence, if an argument is neither in the catalogue nor a file, or if the catalogue cannot be read.
     pub fn select(&self, arguments: &[String], sizes: &[Size]) -> Result<Vec<Selected>, String> {
+        let mut selected: Vec<Selected> = Vec::new();
         if arguments.is_empty() {
             let of_size = |case: &Selected| case.size.is_some_and(|size| sizes.contains(&size));
-            return Ok(self.cases()?.into_iter().filter(of_size).collect());
+            selected.extend(self.cases()?.into_iter().filter(of_size));
         }
-        let mut selected: Vec<Selected> = Vec::new();
         for argument in arguments {
             let mut case = match is_path(argument) {
                 // A missing geometry is an error of a user's own case, and not a reason to leave it out.
@@ -79,8 +80,11 @@ impl Catalogue {
             selected.push(case);
         }
         // An input that is an output, too, is found before work begins.
-        selected.iter().for_each(|case| drop(missing_geometry(&case.path)));
-        ::files::clash().map_or(Ok(selected), |why| Err(why.to_owned()))
+        for Selected { path, .. } in &selected {
+            let geometry = geometry_of(path).map(|file| path.with_file_name(file));
+            geometry.map_or(Ok(()), |file| register_input(&file)).map_err(|why| why.to_string())?;
+        }
+        clash().map_or(Ok(selected), |why| Err(why.to_owned()))
     }
 
     /// The case of the catalogue with this name.
@@ -141,13 +145,16 @@ fn is_path(argument: &str) -> bool {
     Path::new(argument).extension().is_some_and(|extension| extension == "toml")
 }
 
-/// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported
-/// when the case is used.
-fn missing_geometry(case: &Path) -> Option<String> {
+/// The geometry file that a case file names. An unreadable case file is reported when the case is used.
+fn geometry_of(case: &Path) -> Option<String> {
     let table = files::read_text(case).ok()?.parse::<toml::Table>().ok()?;
-    let geometry = table.get("geometry")?.as_str()?;
-    let path = case.parent()?.join(geometry);
-    let exists = ::files::register_input(&path).is_err() || path.exists();
+    Some(table.get("geometry")?.as_str()?.to_owned())
+}
+
+/// A sentence if the case file names a geometry file that does not exist.
+fn missing_geometry(case: &Path) -> Option<String> {
+    let geometry = geometry_of(case)?;
+    let exists = case.with_file_name(&geometry).exists();
     let why = "is missing; ci/setup --geometries fetches it if it can be fetched";
     (!exists).then(|| format!("{geometry} {why}"))
 }

@@ -71,10 +71,10 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary> {
     let fillers = count - leaves;
     let what = "more quadrants, whose data are 3 (in MFEM: attribute 4), fill the root";
     let whose = match shift {
-        0 => "before mid-2020 loads it: a name that ends in .30.p8est makes one for those since",
-        _ => "since mid-2020 loads it, and none before",
+        0 => "before mid-2020; a name that ends in .30.p8est makes one for later versions",
+        _ => "since mid-2020; no earlier version loads it",
     };
-    let notes = vec![format!("{fillers} {what}"), format!("the file is for p4est, which {whose}")];
+    let notes = vec![format!("{fillers} {what}"), format!("the file is for p4est {whose}")];
     Ok(Summary { leaves, bytes, notes })
 }
 
@@ -197,7 +197,7 @@ mod tests {
             let (dir, summary) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let fillers = quadrants_saved(&path) - words.len() as u64;
-            prop_assert!(summary.notes[0].starts_with(&format!("{fillers} more quadrants, whose data are 3 (in MFEM: attribute 4)")), "{summary:?}");
+            prop_assert!(summary.notes[0].starts_with(&format!("{fillers} more quadrants, whose data are 3 (in MFEM: attribute 4)")) && summary.notes[1].contains("for p4est"), "{summary:?}");
             let set = import(&path, true);
             prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
             prop_assert_eq!(set.manifest.root, ROOT);

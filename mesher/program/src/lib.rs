@@ -178,7 +178,7 @@ mod tests {
             ),
             (
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nseeds = [[0, 0, 0,  1, 1, 1]]\n",
-                "a list that is too long (invalid length 6",
+                "a list is longer than what is read of it (invalid length 6",
             ),
             ("geometry = ", "line 1"),
             ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1: invalid type: map"),

@@ -186,10 +186,10 @@ impl fmt::Display for Report {
             writeln!(f, "  {name:<12} {wall:>10.3} {cpu:>9.3}   {lambda:>8.3}")?;
         }
         let (cells, wall) = (self.cells as f64, self.time_wall_s);
-        let peak = self.peak_rss_bytes.iter().sum::<u64>() as f64;
-        let (rate, peak_mb, per_cell) = (cells / wall.max(1e-9) / 1e6, peak / 1e6, peak / cells);
+        let (rate, peak) = (cells / wall.max(1e-9) / 1e6, self.peak_rss_bytes.iter().sum::<u64>());
         writeln!(f, "time           {wall:.3} s wall, {rate:.2} M cells/s")?;
-        write!(f, "peak memory    {peak_mb:.1} MB over all ranks, {per_cell:.2} bytes per cell")
+        write!(f, "peak memory    {:.1} MB over all ranks", peak as f64 / 1e6)?;
+        if cells > 0.0 { write!(f, ", {:.2} bytes per cell", peak as f64 / cells) } else { Ok(()) }
     }
 }
 
@@ -296,5 +296,9 @@ mod tests {
                     time           0.500 s wall, 6.00 M cells/s\n\
                     peak memory    6.0 MB over all ranks, 2.00 bytes per cell";
         assert_eq!(report.to_string(), text);
+        report.cells = 0;
+        assert!(
+            report.to_string().ends_with("0.00 M cells/s\npeak memory    6.0 MB over all ranks")
+        );
     }
 }

@@ -52,13 +52,15 @@ pub struct Check {
     run: fn(&Subject, &mut CheckResult),
 }
 
-/// Name of the check that words ascend and no leaves overlap.
+/// The check that the manifest states what others compare with a case.
+const STATED: &str = "stated";
+/// The check that words ascend and no leaves overlap: the pass over the leaves has found what there is to report.
 const LINEAR: &str = "linear";
 
 /// All checks, in the order in which findings are most helpful.
 pub const CHECKS: [Check; 14] = [
     check(manifest::NAME, |_, _| true, manifest::run),
-    check("stated", |p, s| p.definition && manifest::states_some(s), manifest::states_all),
+    check(STATED, |p, s| p.definition && manifest::states_some(s), manifest::states_all),
     check(LINEAR, |_, _| true, |s, result| result.clone_from(&s.pass.linear)),
     check("complete", |p, _| p.definition || p.complete, complete::run),
     check("spacing", |p, _| p.definition, spacing::run),
@@ -83,7 +85,7 @@ const fn check(
 }
 
 /// The checks that show nothing of a mesh but its form.
-pub const FORMAL: [&str; 3] = [manifest::NAME, "stated", LINEAR];
+pub const FORMAL: [&str; 3] = [manifest::NAME, STATED, LINEAR];
 
 /// Runs all checks that the subject must pass.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {

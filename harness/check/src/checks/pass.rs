@@ -113,7 +113,6 @@ impl State {
     }
 }
 
-/// The pass over the leaves has found what there is to report.
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -79,8 +79,8 @@ impl Mesh<'_> {
         found
     }
 
-    /// The levels of sources in an octant with this content, as a mask that is complete from `first` on: of leaves whose parent is deep, and of
-    /// all that deleted crossing leaves may have.
+    /// The levels of sources in an octant with this content, as a mask that lacks none from `first` on, but may have others: of leaves whose parent
+    /// is deep, also below a needless split, and all levels where crossing leaves were deleted.
     fn sources(&self, octant: &Octant, content: Handle, first: u8) -> u32 {
         if !content.is_node() {
             let is_deleted = content.as_leaf().is_none() && self.has_deleted_crossing();
@@ -94,7 +94,7 @@ impl Mesh<'_> {
         let children =
             || (0..8).map(|digit| (octant.child(digit), self.tree.child(content, digit, level)));
         let below = children().fold(0, |all, (at, of)| all | self.sources(&at, of, first));
-        // Below a needless split, nothing counts.
+        // An octant that is split needlessly counts as a leaf.
         let is_leaf = |(at, of): (Octant, Handle)| !of.is_node() || !self.is_justified(&at);
         let has_own = level + 1 >= first && self.is_deep(octant) && children().any(is_leaf);
         let levels = below | u32::from(has_own) << (level + 1);
@@ -255,8 +255,9 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a box may be the cause that an octant in a crossing leaf of T0 is split. Each leaf that forces a split of level p is nearer than
-    /// (n - 1) / 2 cells of level p, and its parent is of a finer level or meets the box: all steps together are less than n + 1 cells.
+    /// Whether a box may be the cause that an octant of level p in a crossing leaf of T0 is split. A leaf of level l > p that forces the split is nearer
+    /// than n - 1 cells of level l, or touches the octant. Its parent, 2 cells of level l wide, meets such a box or is itself forced to split by
+    /// finer leaves, so all steps together are at most (n + 1) (1/2 + 1/4 + ...) = n + 1 cells of level p.
     fn is_near_box(&self, at: &Octant) -> bool {
         let inputs = &self.mesh.inputs;
         let reach = (i64::from(inputs.layer_cells_min) + 1) * edge_of(at.level) * UNITS_PER_CELL;
