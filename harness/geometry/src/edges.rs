@@ -184,7 +184,7 @@ pub fn stray(input: &Input, first: usize) -> Finding {
 }
 
 /// Facets with the vertices of an earlier facet. Rays pass an odd number of them like one. Two with a solid behind each, by the numbers of
-/// `solids`, are where solids touch: a wall, if the inside is meshed. A facet that is left out of the edges is no duplicate.
+/// `solids`, are where solids touch: a wall. A facet that is left out of the edges is no duplicate.
 pub fn duplicates(input: &Input, of: &Edges, solids: &BTreeMap<u32, i64>, first: usize) -> Finding {
     let mut finding = Finding::new(Kind::Duplicates);
     let mut copies: HashMap<_, Vec<u32>> = HashMap::new();
@@ -198,10 +198,11 @@ pub fn duplicates(input: &Input, of: &Edges, solids: &BTreeMap<u32, i64>, first:
     }
     let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
     let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
-    let passes =
-        |copies: &[u32]| copies.len() % 2 == 1 || !input.are_walls_meshed() && touch(copies);
-    let changing =
-        copies.values().filter(|copies| input.are_seeds_beyond != Some(true) && !passes(copies));
+    let is_meshed = |copies: &[u32]| match touch(copies) {
+        true => input.are_walls_meshed(),
+        false => input.are_seeds_beyond != Some(true),
+    };
+    let changing = copies.values().filter(|copies| copies.len() % 2 == 0 && is_meshed(copies));
     finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();
     finding
 }

@@ -120,7 +120,9 @@ impl Kind {
     /// Whether every occurrence can change the mesh's region. Openings, nested shells, duplicates and intersections are judged one by one.
     pub fn changes_region(self, input: &Input) -> bool {
         match self {
-            Self::NonManifoldOdd => input.are_seeds_beyond != Some(true),
+            Self::NonManifoldOdd => {
+                input.are_seeds_beyond != Some(true) || input.case.keep_crossing
+            }
             Self::Overlaps => input.are_overlaps_meshed(),
             Self::Stray | Self::Rounded | Self::OutsideRoot => true,
             Self::ThinWalls => input.is_meshed(true),
@@ -136,7 +138,7 @@ impl Kind {
             Self::Openings => ("openings",
                 "Inside and outside become one component where a cell fits through."),
             Self::NonManifoldOdd => ("edges with 3, 5, ... facets",
-                "Rays on either side of such an edge disagree about the inside, so a component's side may be wrong or ambiguous."),
+                "Rays on either side of such an edge disagree about the inside, so a component's side may be wrong or ambiguous. Crossing leaves on a wall within the body stay unless keep_crossing is false."),
             Self::Winding => ("neighbours, opposite winding",
                 "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
             Self::InsideOut => ("closed shells inside out",
@@ -150,7 +152,7 @@ impl Kind {
             Self::Intersections => ("intersecting pairs of facets",
                 "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity that the root does not cut. Where they touch, there is a wall in the inside. Crossing leaves stay in both unless keep_crossing is false. Unite the shells if that is not meant."),
             Self::Overlaps => ("facets within another solid",
-                "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity that the root does not cut. Unite them if that is not meant."),
+                "A ray counts the surfaces of both, so where two solids overlap is outside, and deleted like a cavity that the root does not cut, but crossing leaves stay unless keep_crossing is false. Unite them if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
                 "Into a wall narrower than a cell no cell fits, and into a wider one only in some positions and directions: it may consist of crossing leaves, without an inside."),
             Self::ThinGaps => ("facets at thin gaps",
@@ -197,7 +199,7 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     let finest = input.case.root.edge_of(LEVEL_MAX);
     match finding.kind {
         Kind::NonManifoldOdd | Kind::Duplicates | Kind::Intersections | Kind::Overlaps
-            if input.are_seeds_beyond == Some(true) =>
+            if input.are_seeds_beyond == Some(true) && finding.count_changing == 0 =>
         {
             "No effect: seeds and not rays say what is flow, and all of them lie beyond the body.".into()
         }

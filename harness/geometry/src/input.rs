@@ -114,14 +114,14 @@ impl Input {
 
     /// Whether a wall between solids can change the region: within it, or by the crossing leaves on the wall.
     pub fn are_walls_meshed(&self) -> bool {
-        self.is_meshed(true) || self.are_seeds_beyond.is_none() && self.case.keep_crossing
+        self.is_meshed(true) || self.case.keep_crossing
     }
 
     /// Whether an overlap of solids can change the region: such a space, crossing leaves in it, or one that may reach the root's boundary.
     pub fn are_overlaps_meshed(&self) -> bool {
         let cell = self.cell.unwrap_or(self.case.root.edge_of(LEVEL_MAX));
-        let is_cut = || self.case.keep_crossing || self.extent().margin < cell;
-        self.is_space_meshed() || self.are_seeds_beyond.is_none() && is_cut()
+        let is_cut = || self.are_seeds_beyond.is_none() && self.extent().margin < cell;
+        self.case.keep_crossing || self.is_space_meshed() || is_cut()
     }
 
     /// Edge length of the finest cells at a surface in a region of the user's units: those of the boxes that meet it, if they are finer.

@@ -317,7 +317,7 @@ impl fmt::Display for Plan {
         let [all, most] = [peaks.iter().sum(), peaks.iter().copied().max().unwrap_or(0)].map(bytes);
         writeln!(f, "peak memory    {all} over all ranks, {most} on a rank at most")?;
         let [words, tree] = [self.words_bytes, self.tree_bytes].map(bytes);
-        writeln!(f, "files          leaf words of {words} per rank; or a tree of {tree}")?;
+        writeln!(f, "files          leaf words of {words} per rank; or a tree up to {tree}")?;
         let Some(Tightest { limit, left_bytes, needed_bytes }) = self.tightest else {
             return write!(f, "fits           no limit is known");
         };

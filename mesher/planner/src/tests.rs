@@ -311,7 +311,7 @@ fn a_plan_says_all_that_a_run_takes() {
         "cells          about 1.2e6\n\
          time           12.60 s of CPU time over all ranks\n\
          peak memory    5.5 MB over all ranks, 3.5 MB on a rank at most\n\
-         files          leaf words of 4.1 MB per rank; or a tree of 1.2 kB\n\
+         files          leaf words of 4.1 MB per rank; or a tree up to 1.2 kB\n\
          fits           yes: needs 5.0 MB more, the machine has 900 MB left"
     );
     plan.tightest = None;

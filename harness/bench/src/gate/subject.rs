@@ -132,7 +132,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
         Failure { why, ..failure.into() }
     })?;
-    let why = format!("the build succeeded, but did not make {} anew", program.display());
+    let why = format!("the build succeeded, but did not rebuild {}", program.display());
     Failure::unless(program.is_file(), format!("{label}: {why}: check [build]"))?;
     Ok(program)
 }
