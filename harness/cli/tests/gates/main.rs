@@ -467,7 +467,7 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
     fixture.write("built.toml", &format!("{engine}{without}"));
     let stale = fixture.harness(&format!("{gate} --baseline HEAD"));
     let is_found =
-        stale.printed.contains("the working tree: the build succeeded, but did not make ");
+        stale.printed.contains("the working tree: the build succeeded, but did not rebuild ");
     assert_eq!((stale.code, is_found), (2, true), "{}", stale.printed);
     let elsewhere = fixture.harness(&format!("{} --baseline HEAD~1", gate.replace("other/", ".")));
     assert_eq!(elsewhere.code, 2, "{}", elsewhere.printed);
