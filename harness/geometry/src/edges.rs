@@ -198,10 +198,8 @@ pub fn duplicates(input: &Input, of: &Edges, solids: &BTreeMap<u32, i64>, first:
     }
     let is_within = |facet: &u32| solids.get(facet).is_some_and(|count| count % 2 == 1);
     let touch = |copies: &[u32]| copies.len() == 2 && copies.iter().all(&is_within);
-    let is_meshed = |copies: &[u32]| match touch(copies) {
-        true => input.are_walls_meshed(),
-        false => input.are_seeds_beyond != Some(true),
-    };
+    let are_rays_counted = input.are_seeds_beyond != Some(true);
+    let is_meshed = |copies: &[u32]| input.are_walls_meshed() || are_rays_counted && !touch(copies);
     let changing = copies.values().filter(|copies| copies.len() % 2 == 0 && is_meshed(copies));
     finding.count_changing = changing.map(|copies| copies.len() as u64 - 1).sum();
     finding

@@ -120,7 +120,7 @@ impl Input {
     /// Whether an overlap of solids can change the region: such a space, crossing leaves in it, or one that may reach the root's boundary.
     pub fn are_overlaps_meshed(&self) -> bool {
         let cell = self.cell.unwrap_or(self.case.root.edge_of(LEVEL_MAX));
-        let is_cut = || self.are_seeds_beyond.is_none() && self.extent().margin < cell;
+        let is_cut = || self.are_seeds_beyond.is_none() && self.extent().margin <= cell;
         self.case.keep_crossing || self.is_space_meshed() || is_cut()
     }
 

@@ -23,7 +23,7 @@ use std::collections::HashSet;
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
 const TOLERANCE: f64 = 2.0;
 
-/// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex; and the facets at them.
+/// All openings within the root, widest first: a hole, the rim of a sheet, or several that share a vertex; and the facets at those as wide as a cell.
 pub fn openings(input: &Input, edges: &Edges, first: usize) -> (Finding, HashSet<u32>) {
     // Where all facets are copies of one, a surface ends of which every facet is there twice.
     let corners = |of: &Use| edges.corners[of.facet as usize].map(sorted);
@@ -33,35 +33,38 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> (Finding, HashSet
     let (low, edge) = (input.case.root.origin, input.case.root.edge);
     let mut rims = uncancelled(open.collect(), &edges.points, tolerance);
     // Without a spacing, any may be chosen, up to the finest.
-    let finest = input.case.root.edge_of(LEVEL_MAX);
-    let cell_in = |extent: &Aabb| input.cell_in(extent).unwrap_or(finest);
-    // Where the root cuts a body, its boundary closes the body, also where no leaf fits between them. A box near by may split it.
+    let (near, finest) = (input.cell.unwrap_or(0.0), input.case.root.edge_of(LEVEL_MAX));
+    // A box near by splits leaves beside it, too.
+    let cell_in = |extent: &Aabb| input.cell_in(&extent.loosened(near)).unwrap_or(finest);
+    // One opening from face to face of the root stays one.
+    let mut sets = Sets::new(edges.points.len());
+    rims.iter().for_each(|segment| sets.union(segment.ends[0], segment.ends[1]));
+    // Where the root cuts a body, its boundary closes the body, also where no leaf fits between them.
     rims.retain(|rim| {
         let ends = rim.ends.map(|v| Point::from(edges.points[v as usize]));
-        let cell = cell_in(&Aabb::from_points(ends).loosened(input.cell.unwrap_or(0.0)));
+        let cell = cell_in(&Aabb::from_points(ends));
         let is_beyond = |a: usize| {
             let at = ends.map(|end| end[a] - low[a]);
             at.iter().all(|at| *at < cell) || at.iter().all(|at| *at > edge - cell)
         };
         !(0..3).any(is_beyond)
     });
-    let mut places = places(&rims, &edges.points);
+    let mut places = places(&rims, &edges.points, &mut sets);
     let width = |place: &Place| place.width.unwrap_or(0.0);
-    places.sort_by(|(a, _), (b, _)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
-    let leaks = |(place, extent): &&(Place, Aabb)| width(place) >= cell_in(extent);
+    places.sort_by(|(a, ..), (b, ..)| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
+    let leaks = |(place, extent, _): &&(Place, Aabb, Vec<u32>)| width(place) >= cell_in(extent);
+    let torn = places.iter().filter(leaks).flat_map(|(.., facets)| facets).copied().collect();
     let finding = Finding {
         count: places.len() as u64,
         count_changing: places.iter().filter(leaks).count() as u64,
-        places: places.into_iter().take(first).map(|(place, _)| place).collect(),
+        places: places.into_iter().take(first).map(|(place, ..)| place).collect(),
         ..Finding::new(Kind::Openings)
     };
-    (finding, rims.iter().map(|rim| rim.facet).collect())
+    (finding, torn)
 }
 
-/// The places of connected segments, with their bounding boxes.
-fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
-    let mut sets = Sets::new(points.len());
-    rims.iter().for_each(|segment| sets.union(segment.ends[0], segment.ends[1]));
+/// The places of the segments of each set, with their bounding boxes, and all facets of each.
+fn places(rims: &[Use], points: &[[f64; 3]], sets: &mut Sets) -> Vec<(Place, Aabb, Vec<u32>)> {
     let mut labelled: Vec<(u32, Use)> =
         rims.iter().map(|segment| (sets.root(segment.ends[0]), *segment)).collect();
     labelled.sort_unstable();
@@ -75,7 +78,8 @@ fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<(Place, Aabb)> {
         let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
         let extent = Aabb::from_points(ends.iter().map(|&end| Point::from(end)));
         let (width, is_bound) = free_width(&ends);
-        (Place { width: Some(width), is_bound, ..Place::new(facets, centre) }, extent)
+        let place = Place::new(facets.clone(), centre);
+        (Place { width: Some(width), is_bound, ..place }, extent, facets)
     };
     labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }

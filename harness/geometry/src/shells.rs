@@ -116,10 +116,11 @@ impl Shells {
         (shell.is_closed && shell.is_oriented && shell.volume_sixfold != 0).then_some(!is_inward)
     }
 
-    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
+    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes, nor are both within a third.
     pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
         let [Some(p), Some(q)] = [a, b].map(|i| self.all.get(i as usize)) else { return false };
-        a != b && p.is_closed && q.is_closed && !p.may_be_in(q) && !q.may_be_in(p)
+        let may_be_one = p.is_nested && q.is_nested || p.may_be_in(q) || q.may_be_in(p);
+        a != b && p.is_closed && q.is_closed && !may_be_one
     }
 
     /// Closed shells that are inside out, and those that lie in an odd number of others.

@@ -112,6 +112,82 @@ fn the_rim_of_a_half_model_in_a_face_of_the_root_is_no_opening() {
     }
 }
 
+/// A slot from face to face of the root keeps two rims only, of an edge each, which are one opening.
+#[test]
+fn an_opening_from_face_to_face_of_the_root_is_as_wide_as_between_its_edges() {
+    let bar = cuboid([0.0, 0.0, -16.0], [4.0, 4.0, 16.0]);
+    let is_along = |f: &Facet, a: usize| f.iter().any(|v| v[a] != f[0][a]);
+    let channel: Vec<Facet> = bar.into_iter().filter(|f| is_along(f, 2)).collect();
+    assert_eq!(count(&case(&channel, ""), Kind::Openings), 0);
+    let is_wall = |f: &Facet| is_along(f, 0) || f[0][0] == 0.0;
+    let found = case(&channel.into_iter().filter(is_wall).collect::<Vec<_>>(), "");
+    let openings = found.finding(Kind::Openings).unwrap();
+    assert_eq!((openings.count, openings.count_changing), (1, 1), "{found}");
+    assert!(close(openings.places[0].width, 4.0), "{found}");
+}
+
+/// By the wall with a hole smaller than a cell, octants that a box divides have smaller leaves, beyond the box, too.
+#[test]
+fn a_box_beside_an_opening_may_let_it_leak() {
+    let facets = cube_with_hole([1.9; 2], [2.1; 2]);
+    for (high, has_effect) in [(-0.02, true), (-4.0, false)] {
+        let rules =
+            format!("[[box]]\nmin = [1.0, 1.0, -8.0]\nmax = [3.0, 3.0, {high:?}]\nspacing = 0.05");
+        let found = case(&facets, &rules);
+        let openings = found.finding(Kind::Openings).unwrap();
+        assert_eq!((openings.count, openings.count_changing), (1, has_effect.into()), "{found}");
+    }
+}
+
+/// A hole that crossing leaves close leaves a solid in a solid what it is.
+#[test]
+fn a_solid_in_a_solid_is_found_behind_a_hole_smaller_than_a_cell() {
+    let scaled = |v: [f32; 3]| v.map(|c| c * 4.0 - 6.0);
+    let around: Vec<Facet> = cube().iter().map(|f| f.map(scaled)).collect();
+    for (high, nested) in [(2.1, 1), (3.0, 0)] {
+        let facets = [&around[..], &cube_with_hole([1.9; 2], [high; 2])].concat();
+        let found = case(&facets, "keep = 'inside'");
+        assert_eq!(count(&found, Kind::Nested), nested, "{found}");
+    }
+}
+
+/// Both cavities are closed and beside each other, but bound one solid.
+#[test]
+fn a_wall_between_two_cavities_is_thin() {
+    let cavity = |low, high| cuboid(low, high).into_iter().map(|[a, b, c]| [c, b, a]).collect();
+    let cavities: [Vec<Facet>; 2] =
+        [cavity([1.0; 3], [3.0, 7.0, 7.0]), cavity([3.125, 1.0, 1.0], [7.0; 3])];
+    let body = [cuboid([0.0; 3], [8.0; 3]), cavities.concat()].concat();
+    let found = case(&body, "keep = 'inside'");
+    assert_eq!(count(&found, Kind::ThinWalls), 4, "{found}");
+}
+
+/// Seeds and not rays say what is flow, but crossing leaves on copies within the body stay.
+#[test]
+fn copies_within_the_body_change_the_region_of_seeds_beyond_it_if_crossing_leaves_stay() {
+    let other = cuboid([4.0, 0.0, 0.0], [8.0, 4.0, 4.0]).into_iter().map(|[a, b, c]| [c, b, a]);
+    let facets: Vec<Facet> = cube().into_iter().chain(other).collect();
+    for keep_crossing in [true, false] {
+        let found =
+            case(&facets, &format!("keep_crossing = {keep_crossing}\nseeds = [[-9.0, 3.5, 3.5]]"));
+        let changing = found.finding(Kind::Duplicates).unwrap().count_changing;
+        assert_eq!(changing, if keep_crossing { 2 } else { 0 }, "{found}");
+    }
+}
+
+/// The last layer of leaves before the root's boundary may cross the body.
+#[test]
+fn an_overlap_in_a_body_a_cell_from_the_root_may_be_flow() {
+    let overlapping = |margin: f32| {
+        let at = 16.0 - margin;
+        [cuboid([0.0; 3], [at; 3]), cuboid([4.0; 3], [8.0; 3])].concat()
+    };
+    for (margin, has_effect) in [(0.25, true), (0.26, false)] {
+        let found = case(&overlapping(margin), "keep_crossing = false");
+        assert_eq!(found.changes_region, has_effect, "{found}");
+    }
+}
+
 #[test]
 fn vertices_that_f32_numbers_cannot_hold_are_found() {
     let mut facets = cube();
